@@ -21,8 +21,10 @@
 //!   that none of them holds, are left out, counted and [named](crate::view::SceneIssue); everything else is drawn.
 //!   With the limits that every device has, a scene has two million objects, as many materials, and 1.6 million lights
 //!   in a view; request the limits of the adapter for more.
-//! - **Few changes of bindings with textures of many sizes.** Textures of one size and format are layers of an array,
-//!   and four arrays are bound together; materials that need others are drawn apart.
+//! - **Few changes of bindings with textures of many sizes.** Textures of one [class](crate::scene::TextureClass) are
+//!   layers of an array, and six arrays are bound together; materials that need others are drawn apart. Of the 16
+//!   textures and samplers that a shader has on every device, 10 and 9 are left for a process's own: the targets that it
+//!   samples, and its resources.
 //! - **More than one frame in flight on the device's queue, by itself.** The engine decides when it submits, and how
 //!   many frames it keeps.
 //! - **Recursion by itself.** A mirror in a mirror, or a portal in a portal, is as deep as the engine has cameras for

@@ -111,15 +111,15 @@ impl TextureFormat {
 
 impl TextureClass {
     /// Width and height of a mip level in texels.
-    pub fn level_size(self, level: u32) -> [u32; 2] {
+    pub(crate) fn level_size(self, level: u32) -> [u32; 2] {
         [self.width, self.height].map(|side| side.checked_shr(level).unwrap_or(0).max(1))
     }
 
     /// The rows of a mip level, and the bytes of each: rows of blocks, if the format has blocks.
-    pub fn level_rows(self, level: u32) -> (u32, u32) {
+    pub(crate) fn level_rows(self, level: u32) -> (u32, u32) {
         let side = self.format.block_side();
         let [columns, rows] = self.level_size(level).map(|texels| texels.div_ceil(side));
-        (rows, columns * self.format.block_bytes())
+        (rows, columns.saturating_mul(self.format.block_bytes()))
     }
 
     /// The bytes of a texture with all its levels.
@@ -128,7 +128,7 @@ impl TextureClass {
             let (rows, row_bytes) = self.level_rows(level);
             u64::from(rows) * u64::from(row_bytes)
         };
-        (0..self.mip_levels).map(bytes_of).sum()
+        (0..self.mip_levels.min(self.complete_levels())).map(bytes_of).fold(0, u64::saturating_add)
     }
 
     /// The number of levels down to one texel.

@@ -1,9 +1,11 @@
 //! Numbers of scenes that are no positions, colours or angles: those are in `tests/extremes`.
 
 use drawloom::glam::{DVec3, Quat, Vec3};
+use drawloom::process::Deferred;
 use drawloom::scene::{
-    Bounds, Camera, Changes, IndexBuffer, LayerMask, LevelOfDetail, Light, Mesh, MeshBuffers, ObjectSet, StaticGroup,
-    StreamAttribute, StreamLayout, Texture, Topology, Vertex, VertexStream,
+    Bounds, Camera, Changes, IndexBuffer, LayerMask, LevelOfDetail, Light, Material, Mesh, MeshBuffers, ObjectSet,
+    Sampler, StaticGroup, StreamAttribute, StreamLayout, Texture, TextureClass, TextureFormat, Topology, Vertex,
+    VertexStream,
 };
 use drawloom::wgpu;
 use drawloom_testing::adapter::noop_device;
@@ -15,9 +17,19 @@ use crate::fixture::{COUNTS, FLOATS, Fixture, ensure, refused, same, scene};
 pub const CASES: &[NumberCase] = &[
     NumberCase {
         name: "textures_and_meshes_of_any_size",
-        numbers: &["scene::Texture::new", "scene::Mesh::new", "scene::Mesh::cuboid", "scene::LevelOfDetail::new"],
+        numbers: &[
+            "scene::Texture::new",
+            "scene::Texture::with_levels",
+            "scene::TextureClass::height",
+            "scene::TextureClass::mip_levels",
+            "scene::TextureClass::width",
+            "scene::Mesh::new",
+            "scene::Mesh::cuboid",
+            "scene::LevelOfDetail::new",
+        ],
         check: assets,
     },
+    NumberCase { name: "samplers_of_any_anisotropy", numbers: &["scene::Sampler::anisotropy"], check: samplers },
     NumberCase {
         name: "meshes_are_subdivided_to_any_length",
         numbers: &["scene::Mesh::subdivided"],
@@ -68,6 +80,17 @@ fn assets() -> Result<(), Failed> {
         for height in COUNTS {
             let made = Texture::new("texture", width, height, vec![255; 4]);
             ensure(made.is_ok() == ([width, height] == [1, 1]), format_args!("{width} by {height}: {made:?}"))?;
+            let levels = vec![vec![255; 2]; 1];
+            let made = Texture::with_levels("texture", TextureFormat::R16Float, [width, height], levels);
+            ensure(made.is_ok() == ([width, height] == [1, 1]), format_args!("{width} by {height}: {made:?}"))?;
+            for mip_levels in COUNTS {
+                let (format, sampler) = (TextureFormat::Bc7Srgb, Sampler::REPEAT);
+                let class = TextureClass { width, height, format, mip_levels, sampler };
+                ensure(
+                    (class.bytes() == 0) == (mip_levels == 0 || width == 0 && height == 0),
+                    format_args!("{class:?}"),
+                )?;
+            }
         }
     }
     for number in FLOATS {
@@ -82,6 +105,22 @@ fn assets() -> Result<(), Failed> {
         ensure(made.is_ok() == (index < 3), format_args!("an index of {index}: {made:?}"))?;
         let made = Mesh::cuboid("box", Vec3::ONE)?.with_levels([LevelOfDetail::new(vec![0, 1, index], 1.0)]);
         ensure(made.is_ok() == (index < 24), format_args!("an index of {index} in a level"))?;
+    }
+    Ok(())
+}
+
+fn samplers() -> Result<(), Failed> {
+    let mut fixture = Fixture::noop(1, Deferred::to_picture())?;
+    for anisotropy in [0, 1, 2, 3, 16, 17, u8::MAX] {
+        let mut scene = scene();
+        let sampler = Sampler { anisotropy, ..Sampler::REPEAT };
+        let texture = scene.add(Texture::new("texture", 1, 1, vec![255; 4])?.sampled_by(sampler))?;
+        let materials: Vec<_> = scene.assets().iter::<Material>().map(|(handle, _)| handle).collect();
+        for material in materials {
+            let textured = Material { texture: Some(texture), ..scene.assets().get(material)?.clone() };
+            scene.replace(material, textured)?;
+        }
+        fixture.draw(&scene)?;
     }
     Ok(())
 }

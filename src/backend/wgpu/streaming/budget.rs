@@ -29,9 +29,9 @@ pub struct StreamingBudget {
     /// The device's memory for textures, in bytes: that of whole texture arrays, of which each has textures of one
     /// [class](crate::scene::TextureClass). While an array moves to a larger one, both are there.
     pub texture_bytes: u64,
-    /// The most bytes that are uploaded from one frame to the next. Larger meshes and textures take several frames. The
-    /// same number more may be uploaded by the frame itself, for meshes that replace others on the device and are no
-    /// larger.
+    /// The most bytes that are uploaded from one frame to the next, or a row of a texture, if that takes more. Larger
+    /// meshes and textures take several frames. The same number more may be uploaded by the frame itself, for meshes
+    /// that replace others on the device and are no larger.
     pub upload_bytes_per_frame: u64,
     /// A background job that uploads ends after this time, once it has done what it began: a portion of 256 KiB at
     /// most, or the mip levels of one texture.
@@ -39,9 +39,9 @@ pub struct StreamingBudget {
 }
 
 impl StreamingBudget {
-    /// The smallest budget of each kind in bytes: a texture array of a few layers, and one row of the largest texture.
+    /// The smallest budget of each kind in bytes.
     pub const MIN_BYTES: u64 = 1 << 20;
-    /// The smallest number of bytes a frame: a few rows of the largest textures.
+    /// The smallest number of bytes a frame: a few rows of a usual texture.
     pub const MIN_UPLOAD_BYTES: u64 = 1 << 16;
 
     /// Checks the numbers.

@@ -20,13 +20,15 @@ impl UploadBudget {
     }
 
     /// Takes at most `bytes`, a multiple of `unit`, which `bytes` is, too. 0 if nothing is allowed any more. The first
-    /// portion is allowed at any time, so that something is uploaded even if the time is over before it begins.
+    /// portion is allowed at any time, and is a unit at least, so that something is uploaded even if the time is over
+    /// before it begins, or the bytes are too few.
     pub(super) fn take(&mut self, bytes: u64, unit: u64) -> u64 {
-        let taken = bytes.min(Self::PORTION.max(unit)).min(self.bytes) / unit * unit;
+        let least = if self.has_begun || self.bytes == 0 { 0 } else { unit };
+        let taken = (bytes.min(Self::PORTION.max(unit)).min(self.bytes) / unit * unit).max(least.min(bytes));
         if taken == 0 || self.is_late() {
             return 0;
         }
-        self.bytes -= taken;
+        self.bytes = self.bytes.saturating_sub(taken);
         self.has_begun = true;
         taken
     }
@@ -70,5 +72,14 @@ mod tests {
     fn one_portion_is_allowed_when_the_time_is_over() {
         let mut upload_budget = UploadBudget::new(100, Duration::ZERO);
         assert_eq!((upload_budget.take(8, 4), upload_budget.take(8, 4), upload_budget.is_over()), (8, 0, true));
+    }
+
+    #[test]
+    fn the_first_portion_is_a_unit_even_if_that_takes_more_bytes() {
+        let mut upload_budget = UploadBudget::new(100, Duration::MAX);
+        assert_eq!(
+            (upload_budget.take(900, 300), upload_budget.take(600, 300), upload_budget.is_over()),
+            (300, 0, true)
+        );
     }
 }
