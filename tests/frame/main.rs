@@ -45,6 +45,8 @@ mod shared_pipelines;
 mod streaming;
 mod target_names;
 mod targets;
+#[cfg(feature = "wgpu")]
+mod textures;
 mod timeline;
 mod triangles;
 mod tuning;
