@@ -52,6 +52,25 @@ pub enum BackendError {
         /// The largest width and height: the device limit `max_texture_dimension_2d`, or that of the software backend.
         allowed: u32,
     },
+    /// A process has more bindings of a kind than a shader may have on the device: those of Drawloom's own, see the
+    /// [limits](crate::guide::limits), the targets and buffers that it declares, and its resources.
+    #[error("the {stage} shader of {process:?} has {needed} {kind}, and device limit {limit} is {allowed}: {shares}")]
+    BindingLimit {
+        /// The process.
+        process: String,
+        /// Which shader: "vertex", "fragment" or "compute".
+        stage: &'static str,
+        /// What there are too many of: "sampled textures", for example.
+        kind: &'static str,
+        /// How many there are.
+        needed: u64,
+        /// Who has how many of them.
+        shares: String,
+        /// The limit's name.
+        limit: &'static str,
+        /// What the device allows.
+        allowed: u64,
+    },
     /// A process's WGSL does not compile.
     #[error("the {part} of {process:?} is wrong in line {line}, column {column}: {message}\n  {text}")]
     Shader {

@@ -2,15 +2,15 @@
 
 use std::sync::Arc;
 
-use drawloom::Renderer;
-use drawloom::backend::{Backend, WgpuBackend};
+use drawloom::backend::{Backend, BackendError, WgpuBackend};
 use drawloom::glam::DVec3;
-use drawloom::process::Deferred;
+use drawloom::process::{ClearColor, Declare, Deferred, Draws, Format, FullScreen, RenderProcess, ShaderResource};
 use drawloom::scene::{Camera, Changes, Material, RenderObject, Scene, SceneRef, Texture, TextureFormat, Topology};
 use drawloom::task::Scheduler;
 use drawloom::view::IssueReason;
+use drawloom::{Renderer, wgpu};
 use drawloom_testing::adapter;
-use drawloom_testing::scenes::{sized, square};
+use drawloom_testing::scenes::{field, sized, square};
 
 #[test]
 fn a_hundred_thousand_textures_are_drawn_and_forgotten() {
@@ -51,5 +51,60 @@ fn a_hundred_thousand_textures_are_drawn_and_forgotten() {
     textures.iter().for_each(|texture| _ = scene.remove(*texture).unwrap());
     for _ in 0..2 {
         assert_eq!(frame(&scene, Changes::NONE).0, [(IssueReason::StaleTexture, TEXTURES as usize)]);
+    }
+}
+
+/// Draws a full-screen triangle, with a number of textures.
+struct Textured(Vec<ShaderResource<'static>>);
+
+impl RenderProcess for Textured {
+    fn name(&self) -> &str {
+        "textured"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.clears_color("color", Format::Rgba8Unorm, ClearColor::Background);
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        let shader = "@fragment fn fragment() -> @location(0) vec4<f32> { return vec4(1.0); }";
+        Draws::FullScreen(FullScreen { shader, resources: self.0.clone(), ..FullScreen::default() })
+    }
+}
+
+#[test]
+fn an_error_says_whose_textures_are_too_many_for_a_shader() {
+    for count in [10, 11] {
+        let (device, queue) = adapter::noop_device().unwrap();
+        let descriptor = wgpu::TextureDescriptor {
+            label: None,
+            size: wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::Rgba8Unorm,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        };
+        let texture = |_| ShaderResource::Texture {
+            view: device.create_texture(&descriptor).create_view(&wgpu::TextureViewDescriptor::default()),
+            dimension: wgpu::TextureViewDimension::D2,
+        };
+        let process = Textured((0..count).map(texture).collect());
+        let builder = Renderer::builder(WgpuBackend::new(device.clone(), queue).unwrap()).process(process);
+        let (mut renderer, _) = builder.output("color").build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
+        let recorded = renderer.record(field(0).as_scene_ref());
+        if count == 10 {
+            recorded.unwrap();
+            continue;
+        }
+        let error = recorded.err().unwrap();
+        let Some(BackendError::BindingLimit { process, kind: "sampled textures", needed: 17, .. }) =
+            error.backend_error()
+        else {
+            panic!("{error}")
+        };
+        assert_eq!(process, "textured");
+        assert!(error.to_string().contains("11 for its columns, materials and resources"), "{error}");
     }
 }

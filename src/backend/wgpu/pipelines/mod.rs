@@ -1,6 +1,7 @@
 //! The pipelines and bind groups of render processes.
 
 mod attachment_formats;
+mod binding_limits;
 mod compile_shader;
 mod compiled_shader;
 mod interner;

@@ -7,6 +7,7 @@ use parking_lot::{Mutex, RwLock, RwLockReadGuard};
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
 
 use super::attachment_formats::{AttachmentFormats, DepthAttachmentFormat, blend_state};
+use super::binding_limits::{GroupBindings, check_binding_limits};
 use super::compile_shader::shader_label;
 use super::compiled_shader::CompiledShader;
 use super::pipeline_inputs::PipelineInputs;
@@ -62,10 +63,20 @@ impl ProcessPipelines {
         let is_compute = key.vertices == VertexSource::Compute;
         let AttachmentFormats { sampled, writes_buffers, .. } = attachments;
         let label = shader_label(&planned.name);
-        let entries = process_layout_entries(key.parameter_bytes, sampled, writes_buffers, is_compute);
-        let process_layout = shared.group_layout(device, &label, entries)?;
-        let engine_layout =
-            shared.group_layout(device, &label, engine_layout_entries(*array_count, resources, is_compute))?;
+        let of_process = process_layout_entries(key.parameter_bytes, sampled, writes_buffers, is_compute);
+        let of_engine = engine_layout_entries(*array_count, resources, is_compute);
+        if key.vertices != VertexSource::None {
+            let group = |what, entries| GroupBindings { what, entries };
+            let groups = [
+                group("of the frame and the view", &layouts.frame_entries[..]),
+                group("of materials and their textures", &layouts.asset_entries),
+                group("for its parameters, targets and buffers", &of_process),
+                group("for its columns, materials and resources", &of_engine),
+            ];
+            check_binding_limits(&device.limits(), &planned.name, &groups, is_compute)?;
+        }
+        let process_layout = shared.group_layout(device, &label, of_process)?;
+        let engine_layout = shared.group_layout(device, &label, of_engine)?;
         let shader = match key.vertices {
             VertexSource::None => None,
             _ => {

@@ -2,6 +2,7 @@
 //! process; and bind groups that are kept from frame to frame.
 
 use std::num::NonZeroU64;
+use std::sync::Arc;
 
 use wgpu::ShaderStages;
 
@@ -17,6 +18,8 @@ pub(crate) struct BindGroupLayouts {
     pub(crate) frame: wgpu::BindGroupLayout,
     /// Materials and textures.
     pub(crate) assets: wgpu::BindGroupLayout,
+    pub(crate) frame_entries: Arc<[wgpu::BindGroupLayoutEntry]>,
+    pub(crate) asset_entries: Arc<[wgpu::BindGroupLayoutEntry]>,
 }
 
 /// Shipped processes have no compute shaders, but raw passes of an engine may.
@@ -45,7 +48,12 @@ impl BindGroupLayouts {
         let samplers = std::iter::repeat_n(sampler, TextureSet::MAX_ARRAYS + 1);
         let textures = (1..).zip(arrays.chain(samplers)).map(|(binding, ty)| entry(binding, FRAGMENT_AND_COMPUTE, ty));
         let assets: Vec<_> = [entry(0, ALL_STAGES, storage(false))].into_iter().chain(textures).collect();
-        Self { frame: layout("frame", &frame), assets: layout("assets", &assets) }
+        Self {
+            frame: layout("frame", &frame),
+            assets: layout("assets", &assets),
+            frame_entries: frame.into(),
+            asset_entries: assets.into(),
+        }
     }
 }
 
