@@ -5,8 +5,8 @@ use std::borrow::Cow;
 #[cfg(feature = "wgpu")]
 use super::RawPass;
 use super::{
-    BlendEquation, BufferOffset, ComputeDispatch, DrawCount, FaceCulling, ItemDraws, ProceduralDraws, ShaderResource,
-    Stencil, StencilOperation, Workgroups,
+    BlendEquation, BufferOffset, ComputeDispatch, DrawCount, FaceCulling, ItemDraws, PipelineState, ProceduralDraws,
+    ShaderResource, Stencil, StencilOperation, Workgroups,
 };
 use crate::command::{DrawOrder, Selection};
 use crate::scene::{Blend, ColumnLayout};
@@ -74,6 +74,8 @@ pub struct CommandDraws<'a> {
     pub writes_depth: bool,
     /// The stencil test; `None` for none.
     pub stencil: Option<Stencil>,
+    /// How depth is compared and moved, and which channels are written.
+    pub pipeline_state: PipelineState,
     /// The bytes of the uniform at `@group(2) @binding(0)`; if empty, there is no such binding.
     pub parameters: Cow<'a, [u8]>,
     /// The engine's own resources that the shader reads.
@@ -95,6 +97,7 @@ impl Default for CommandDraws<'_> {
             blend_equations: Vec::new(),
             writes_depth: true,
             stencil: None,
+            pipeline_state: PipelineState::default(),
             parameters: Cow::Borrowed(&[]),
             resources: Vec::new(),
         }
@@ -201,23 +204,24 @@ impl Draws<'_> {
     }
 
     /// Whether it draws objects that write depth all over the shape of their meshes, and so hide what is behind them:
-    /// opaque ones, neither deformed nor inside out, without discarding pixels, and whatever the stencil. Those with a
-    /// mask do not.
+    /// opaque ones, neither deformed nor inside out, without discarding pixels, and whatever the stencil and where nearer
+    /// things are. Those with a mask do not.
     pub fn hides(&self) -> bool {
         let Self::Commands(draws) = self else { return false };
         let writes_all = draws.writes_depth && draws.stencil.is_none_or(|stencil| stencil.always_passes());
         let shows_fronts = draws.face_culling != FaceCulling::Reversed;
-        let covers = !draws.discards && shows_fronts;
+        let covers = !draws.discards && shows_fronts && draws.pipeline_state.covers();
         writes_all && covers && draws.deformation.is_none() && draws.blend_equations.is_empty()
     }
 
-    /// Whether objects that are hidden behind others change the stencil, so that they must be drawn.
-    pub fn writes_stencil_where_hidden(&self) -> bool {
+    /// Whether objects that are hidden behind others show, or change the stencil, so that they must be drawn.
+    pub fn draws_where_hidden(&self) -> bool {
         // The stencil test comes before the depth test.
-        self.stencil().is_some_and(|stencil| {
-            let changes = |operation| stencil.write_mask != 0 && operation != StencilOperation::Keep;
-            changes(stencil.on_depth_fail) || changes(stencil.on_fail) && !stencil.always_passes()
-        })
+        self.pipeline_state().is_some_and(PipelineState::shows_hidden)
+            || self.stencil().is_some_and(|stencil| {
+                let changes = |operation| stencil.write_mask != 0 && operation != StencilOperation::Keep;
+                changes(stencil.on_depth_fail) || changes(stencil.on_fail) && !stencil.always_passes()
+            })
     }
 
     /// Whether triangle culling is exact for it: it does not deform objects, and culls faces as materials say.
@@ -256,6 +260,15 @@ impl Draws<'_> {
             Self::Commands(commands) => commands.stencil,
             Self::FullScreen(full_screen) => full_screen.stencil,
             Self::Procedural(procedural) => procedural.stencil,
+            _ => None,
+        }
+    }
+
+    /// The state of its pipelines beside blending, culling and stencil; `None` for what has none of its own.
+    pub fn pipeline_state(&self) -> Option<&PipelineState> {
+        match self {
+            Self::Commands(commands) => Some(&commands.pipeline_state),
+            Self::Procedural(procedural) => Some(&procedural.pipeline_state),
             _ => None,
         }
     }

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use super::{BlendEquation, BufferOffset, ShaderResource, Stencil};
+use super::{BlendEquation, BufferOffset, PipelineState, ShaderResource, Stencil};
 use crate::command::Cull;
 use crate::scene::Blend;
 
@@ -32,6 +32,8 @@ pub struct ProceduralDraws<'a> {
     pub writes_depth: bool,
     /// The stencil test; `None` for none.
     pub stencil: Option<Stencil>,
+    /// How depth is compared and moved, and which channels are written.
+    pub pipeline_state: PipelineState,
     /// The bytes of the uniform at `@group(2) @binding(0)`; if empty, there is no such binding.
     pub parameters: Cow<'a, [u8]>,
     /// The engine's own resources that the shader reads.
@@ -51,6 +53,7 @@ impl Default for ProceduralDraws<'_> {
             blend_equations: Vec::new(),
             writes_depth: true,
             stencil: None,
+            pipeline_state: PipelineState::default(),
             parameters: Cow::Borrowed(&[]),
             resources: Vec::new(),
         }

@@ -16,6 +16,7 @@ mod changing_shaders;
 mod columns;
 mod cube_shadows;
 mod deformation;
+mod depth_states;
 mod determinism;
 mod compute;
 mod cpu_nodes;
@@ -149,6 +150,7 @@ fn main() {
         (sampled_histories::CASES, Needs::Adapter),
         (sampled_layers::CASES, Needs::Adapter),
         (sampled_views::CASES, Needs::Adapter),
+        (depth_states::CASES, Needs::Adapter),
         (determinism::CASES, Needs::Adapter),
         (determinism::CASES_OF_SHARED_SCENES, Needs::AdapterAndSharedScenes),
         (split_screen::CASES, Needs::Adapter),

@@ -18,7 +18,7 @@ use super::view_state::ViewState;
 use crate::backend::error::broken_rule;
 use crate::backend::mip_schedule::MipSchedule;
 use crate::backend::{BackendError, FrameRequest};
-use crate::process::{Access, ClearColor, CpuShader, Draws, Pass, PlannedProcess, TypedCpuShader};
+use crate::process::{Access, ClearColor, CpuShader, Draws, Pass, PipelineState, PlannedProcess, TypedCpuShader};
 use crate::quality::VertexFormat;
 use crate::task::catch;
 
@@ -148,6 +148,11 @@ fn software_pass<R: Precision>(
     };
     if request.draws[pass.process_index].stencil().is_some() {
         let message = String::from("the software backend has no stencil");
+        return Err(BackendError::Validation { label: process, message });
+    }
+    if request.draws[pass.process_index].pipeline_state().is_some_and(|state| *state != PipelineState::default()) {
+        let message =
+            String::from("the software backend has no depth bias, and no depth comparisons or masks of its own");
         return Err(BackendError::Validation { label: process, message });
     }
     if request.plan.attachment_extent(pass.process_index).multisampled {

@@ -369,7 +369,7 @@ pub(in crate::frame) fn occluders(
     let (mut depth, mut colors, mut tests_only, mut occluders) = (None, Vec::new(), false, Vec::new());
     for pass in of_view() {
         let Some(selection) = draws[pass.process_index].selection() else { continue };
-        if draws[pass.process_index].writes_stencil_where_hidden() {
+        if draws[pass.process_index].draws_where_hidden() {
             return None;
         }
         let (target, access) = depth_of(pass)?;

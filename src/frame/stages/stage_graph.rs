@@ -60,7 +60,7 @@ struct DrawsKey {
     selection: Option<Selection>,
     draws_items: bool,
     hides: bool,
-    writes_stencil_where_hidden: bool,
+    draws_where_hidden: bool,
 }
 
 /// The optional parts of a frame.
@@ -114,9 +114,9 @@ impl ViewKey {
 
 impl DrawsKey {
     fn new(draws: &Draws<'_>) -> Self {
-        let (hides, writes_stencil_where_hidden) = (draws.hides(), draws.writes_stencil_where_hidden());
+        let (hides, draws_where_hidden) = (draws.hides(), draws.draws_where_hidden());
         let draws_items = matches!(draws, Draws::Items(_));
-        Self { selection: draws.selection(), draws_items, hides, writes_stencil_where_hidden }
+        Self { selection: draws.selection(), draws_items, hides, draws_where_hidden }
     }
 }
 

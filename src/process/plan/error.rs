@@ -342,6 +342,22 @@ pub enum PlanError {
         /// The number of colour targets.
         targets: usize,
     },
+    /// A process moves depth by a slope or up to a bound that is not finite.
+    #[error("the depth bias of process {process:?} is not finite")]
+    DepthBias {
+        /// The process.
+        process: String,
+    },
+    /// A process has masks for another number of colour targets than it draws into.
+    #[error("process {process:?} has {masks} colour masks for {targets} colour targets")]
+    ColorMaskCount {
+        /// The process.
+        process: String,
+        /// The number of masks.
+        masks: usize,
+        /// The number of colour targets.
+        targets: usize,
+    },
     /// A [resource](crate::process::ShaderResource::Bytes) of a size that no storage buffer can have.
     #[error("resource {resource} of process {process:?} has {bytes} bytes, instead of 4, 8, 12 ...")]
     ResourceSize {

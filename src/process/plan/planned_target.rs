@@ -297,7 +297,8 @@ impl Attachments {
 }
 
 /// # Errors
-/// If a process blends with a target that cannot be blended, or has blend equations for another number of targets.
+/// If a process blends with a target that cannot be blended, or has blend equations or masks for another number of
+/// targets, or a depth bias that is not finite.
 /// Objects without equations are exempt: where the target cannot be blended, their materials' blending is ignored.
 pub(super) fn check_blending(
     planned: &PlannedProcess,
@@ -314,6 +315,13 @@ pub(super) fn check_blending(
     let (equations, targets) = (draws.blend_equations(), attachments.colors);
     if !equations.is_empty() && equations.len() != targets {
         return Err(PlanError::BlendEquationCount { process: process(), equations: equations.len(), targets });
+    }
+    if draws.pipeline_state().is_some_and(|state| !state.depth_bias.is_finite()) {
+        return Err(PlanError::DepthBias { process: process() });
+    }
+    let masks = draws.pipeline_state().map_or(0, |state| state.color_masks.len());
+    if masks > 0 && masks != targets {
+        return Err(PlanError::ColorMaskCount { process: process(), masks, targets });
     }
     for (index, target, format) in &attachments.unblendable {
         if equations.get(*index).map_or(blends, |equation| *equation != BlendEquation::REPLACE) {

@@ -7,8 +7,9 @@ use drawloom::Renderer;
 use drawloom::backend::{NullBackend, Picture, PipelineLibrary, SoftwareBackend};
 use drawloom::command::Cull;
 use drawloom::process::{
-    ClearColor, Comparison, ComputeDispatch, Declare, Deferred, DrawCount, Draws, Exposure, Format, FullScreen, Fxaa,
-    PostStep, ProceduralDraws, RenderProcess, Stencil, StorageBuffer, TargetSize, ToneMapping, Workgroups,
+    ClearColor, Comparison, ComputeDispatch, Declare, Deferred, DepthBias, DrawCount, Draws, Exposure, Format,
+    FullScreen, Fxaa, PipelineState, PostStep, ProceduralDraws, RenderProcess, Stencil, StorageBuffer, TargetSize,
+    ToneMapping, Workgroups,
 };
 use drawloom::scene::ViewKind;
 use drawloom::task::Scheduler;
@@ -37,6 +38,9 @@ pub const CASES: &[NumberCase] = &[
             "process::DrawCount::Count::instances",
             "process::DrawCount::Count::vertices",
             "process::Workgroups::Count",
+            "process::DepthBias::clamp",
+            "process::DepthBias::constant",
+            "process::DepthBias::slope",
             "process::Stencil::read_mask",
             "process::Stencil::reference",
             "process::Stencil::write_mask",
@@ -167,6 +171,18 @@ fn draws() -> Result<(), Failed> {
         let draws = Draws::Procedural(ProceduralDraws { shader, count, ..ProceduralDraws::default() });
         let drawn = draw(Process { size: TargetSize::Picture, layers: None, draws });
         ensure(drawn.is_err(), format_args!("arguments at {index} lie beyond the buffer"))?;
+    }
+    for number in FLOATS {
+        for depth_bias in [
+            DepthBias { slope: number, constant: i32::MIN, clamp: 0.0 },
+            DepthBias { clamp: number, constant: i32::MAX, slope: 1.0 },
+        ] {
+            let pipeline_state = PipelineState { depth_bias, ..PipelineState::default() };
+            let count = DrawCount::Count { vertices: 3, instances: 1 };
+            let draws = ProceduralDraws { shader, count, pipeline_state, ..ProceduralDraws::default() };
+            let drawn = draw(Process { size: TargetSize::Picture, layers: None, draws: Draws::Procedural(draws) });
+            ensure(drawn.is_ok() == number.is_finite(), format_args!("{depth_bias:?}: {drawn:?}"))?;
+        }
     }
     for mask in [0, 1, u8::MAX] {
         let stencils = [

@@ -2,8 +2,8 @@
 
 use crate::backend::wgpu::resources::{SampledTarget, sample_count, shape_dimension, texture_format};
 use crate::process::{
-    Access, BlendComponent, BlendEquation, BlendFactor, Comparison, Format, FramePlan, PlannedProcess, PlannedTarget,
-    Stencil, StencilOperation,
+    Access, BlendComponent, BlendEquation, BlendFactor, ColorMask, Comparison, DepthBias, Format, FramePlan,
+    PlannedProcess, PlannedTarget, Stencil, StencilOperation,
 };
 
 /// The formats of the targets that a process draws into and samples, and how it uses buffers.
@@ -79,6 +79,7 @@ impl DepthAttachmentFormat {
         self,
         writes_depth: bool,
         depth_compare: wgpu::CompareFunction,
+        bias: DepthBias,
         stencil: Option<Stencil>,
     ) -> wgpu::DepthStencilState {
         wgpu::DepthStencilState {
@@ -86,9 +87,20 @@ impl DepthAttachmentFormat {
             depth_write_enabled: self.format.has_depth().then_some(self.writes_depth && writes_depth),
             depth_compare: self.format.has_depth().then_some(depth_compare),
             stencil: stencil.map_or_else(wgpu::StencilState::default, stencil_state),
-            bias: wgpu::DepthBiasState::default(),
+            bias: wgpu::DepthBiasState { constant: bias.constant, slope_scale: bias.slope, clamp: bias.clamp },
         }
     }
+}
+
+pub(super) fn color_writes(mask: ColorMask) -> wgpu::ColorWrites {
+    let ColorMask { red, green, blue, alpha } = mask;
+    let channels = [
+        (red, wgpu::ColorWrites::RED),
+        (green, wgpu::ColorWrites::GREEN),
+        (blue, wgpu::ColorWrites::BLUE),
+        (alpha, wgpu::ColorWrites::ALPHA),
+    ];
+    channels.into_iter().filter(|(is_written, _)| *is_written).map(|(_, channel)| channel).collect()
 }
 
 /// `None` where nothing is mixed.
@@ -139,7 +151,7 @@ fn stencil_state(stencil: Stencil) -> wgpu::StencilState {
     wgpu::StencilState { front: face, back: face, read_mask, write_mask }
 }
 
-fn compare_function(comparison: Comparison) -> wgpu::CompareFunction {
+pub(super) fn compare_function(comparison: Comparison) -> wgpu::CompareFunction {
     match comparison {
         Comparison::Never => wgpu::CompareFunction::Never,
         Comparison::Less => wgpu::CompareFunction::Less,

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use crate::command::{Cull, DrawState};
-use crate::process::{BlendEquation, Draws, FaceCulling, Primitive, Stencil, prelude_with};
+use crate::process::{BlendEquation, Draws, FaceCulling, PipelineState, Primitive, Stencil, prelude_with};
 use crate::quality::{Quality, TransformPrecision, VertexFormat};
 use crate::scene::{AttributeLayout, Blend, LightVolume, Topology};
 
@@ -24,6 +24,8 @@ pub(crate) struct PipelineKey<'a> {
     /// Of each colour target; empty if the state decides.
     pub(crate) blend_equations: Cow<'a, [BlendEquation]>,
     pub(crate) stencil: Option<Stencil>,
+    /// `None` for what has none of its own.
+    pub(crate) pipeline_state: Option<Cow<'a, PipelineState>>,
     /// The only draw state of a process without commands.
     pub(crate) state: Option<DrawState>,
     transforms: TransformPrecision,
@@ -67,6 +69,7 @@ impl<'a> PipelineKey<'a> {
                 face_culling,
                 blend_equations,
                 stencil,
+                pipeline_state: draws.pipeline_state().map(Cow::Borrowed),
                 state,
                 transforms,
             }
@@ -103,7 +106,17 @@ impl<'a> PipelineKey<'a> {
         let clamped_fragments = self.clamped_fragments.map(|text| text.map(owned));
         let blend_equations = Cow::Owned(self.blend_equations.into_owned());
         let shader = owned(self.shader);
-        PipelineKey { shader, deformation, fragment, masked, clamped_fragments, blend_equations, ..self }
+        let pipeline_state = self.pipeline_state.map(|state| Cow::Owned(state.into_owned()));
+        PipelineKey {
+            shader,
+            deformation,
+            fragment,
+            masked,
+            clamped_fragments,
+            blend_equations,
+            pipeline_state,
+            ..self
+        }
     }
 
     /// What goes before the process's own WGSL, which reads these attributes and may [clamp corners](prelude_with).

@@ -6,7 +6,9 @@ use std::sync::OnceLock;
 use parking_lot::{Mutex, RwLock, RwLockReadGuard};
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
 
-use super::attachment_formats::{AttachmentFormats, DepthAttachmentFormat, blend_state};
+use super::attachment_formats::{
+    AttachmentFormats, DepthAttachmentFormat, blend_state, color_writes, compare_function,
+};
 use super::binding_limits::{GroupBindings, check_binding_limits};
 use super::compile_shader::shader_label;
 use super::compiled_shader::CompiledShader;
@@ -19,7 +21,7 @@ use crate::backend::BackendError;
 use crate::backend::wgpu::resources::{BindGroupLayouts, engine_layout_entries, process_layout_entries};
 use crate::backend::wgpu::strategy::{PassTuner, StrategySet};
 use crate::command::{Cull, DrawState};
-use crate::process::{Access, DeclaredAttribute, Draws, FramePlan, PlannedProcess, Primitive};
+use crate::process::{Access, ColorMask, DeclaredAttribute, DepthBias, Draws, FramePlan, PlannedProcess, Primitive};
 use crate::quality::Quality;
 use crate::scene::{Blend, Topology};
 use crate::unwind::emit_unlocked;
@@ -221,11 +223,16 @@ impl ProcessPipelines {
         let state = variant.state;
         let PipelineInputs { name, key, attachments, attributes, .. } = &self.inputs;
         let AttachmentFormats { colors, can_be_blended, .. } = attachments;
-        let equations = &key.blend_equations;
+        let (equations, own) = (&key.blend_equations, key.pipeline_state.as_deref());
+        let write_mask = |index| {
+            let mask = own.and_then(|own| own.color_masks.get(index)).copied().unwrap_or(ColorMask::ALL);
+            color_writes(mask)
+        };
         let target = |(index, (format, can_be_blended)): (usize, (&Option<wgpu::TextureFormat>, &bool))| {
             let equation = equations.get(index).copied().unwrap_or_else(|| state.blend().into());
             let blend = blend_state(equation).filter(|_| *can_be_blended);
-            format.map(|format| wgpu::ColorTargetState { format, blend, write_mask: wgpu::ColorWrites::ALL })
+            let write_mask = write_mask(index);
+            format.map(|format| wgpu::ColorTargetState { format, blend, write_mask })
         };
         let targets: Vec<_> = colors.iter().zip(can_be_blended).enumerate().map(target).collect();
         let buffers = match &variant.layout {
@@ -283,9 +290,13 @@ impl ProcessPipelines {
                 // A blended surface must not hide what is drawn after it, unless the process says so.
                 let may_write_depth = !equations.is_empty() || state.blend() == Blend::None;
                 let writes_depth = key.writes_depth && may_write_depth;
-                depth.pipeline_state_of(writes_depth, self.depth_compare(depth), key.stencil)
+                let comparison = own.and_then(|own| own.depth_comparison).map(compare_function);
+                let comparison = comparison.unwrap_or_else(|| self.depth_compare(depth));
+                let bias = own.map_or_else(DepthBias::default, |own| own.depth_bias);
+                depth.pipeline_state_of(writes_depth, comparison, bias, key.stencil)
             }),
             samples: attachments.samples,
+            alpha_to_coverage: attachments.samples > 1 && own.is_some_and(|own| own.alpha_to_coverage),
             fragment: fragment.map(|entry_point| (entry_point.clone().into_owned(), targets)),
         };
         self.shared.render_pipeline(device, label, description).map(Some)

@@ -45,6 +45,8 @@ pub(crate) struct RenderPipelineDescription {
     pub(super) depth_stencil: Option<wgpu::DepthStencilState>,
     /// The number of samples of a pixel.
     pub(super) samples: u32,
+    /// Whether alpha decides how many of them are covered.
+    pub(super) alpha_to_coverage: bool,
     /// The fragment entry point, and the colour targets.
     pub(super) fragment: Option<(String, Vec<Option<wgpu::ColorTargetState>>)>,
 }
@@ -137,7 +139,11 @@ impl SharedPipelines {
                 },
                 primitive: description.primitive,
                 depth_stencil: description.depth_stencil.clone(),
-                multisample: wgpu::MultisampleState { count: description.samples, ..wgpu::MultisampleState::default() },
+                multisample: wgpu::MultisampleState {
+                    count: description.samples,
+                    alpha_to_coverage_enabled: description.alpha_to_coverage,
+                    ..wgpu::MultisampleState::default()
+                },
                 fragment: fragment.as_ref().map(|(entry_point, targets)| wgpu::FragmentState {
                     module,
                     entry_point: Some(entry_point),
