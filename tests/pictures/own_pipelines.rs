@@ -3,11 +3,14 @@
 #[path = "../../examples/forward/pipeline.rs"]
 mod forward;
 
+use drawloom::command::Selection;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{
-    ClearColor, Declare, Deferred, Draws, Format, FullScreen, InjectionPoint, RenderProcess, ToneMapping,
+    ClearColor, CommandDraws, Declare, Deferred, Draws, Format, FullScreen, InjectionPoint, RenderProcess, ToneMapping,
+    lighting_shader, targets,
 };
-use drawloom::scene::{Blend, Camera, Light, Material, RenderObject, Scene, ViewKind};
+use drawloom::scene::{Blend, Camera, Light, Material, MaterialType, RenderObject, Scene, ViewKind};
+use drawloom::view::ShadowMaps;
 use drawloom_testing::scenes::{cube, field, sized};
 use libtest_mimic::Failed;
 
@@ -19,6 +22,7 @@ use forward::Forward;
 
 pub const CASES: &[Case] = &[
     ("a_forward_pipeline_draws_what_the_deferred_one_draws", forward_and_deferred),
+    ("surfaces_of_the_engines_own_have_the_light_and_shadows_of_shipped_ones", lit_surfaces),
     ("a_forward_pipeline_has_the_processes_that_its_lamps_require", forward_processes),
     ("a_target_of_reflections_is_sampled_with_and_without_a_mirror", own_reflection),
     ("a_process_that_comes_and_goes_leaves_histories_and_pipelines_of_others", comes_and_goes),
@@ -67,6 +71,106 @@ fn forward_and_deferred() -> Result<(), Failed> {
     // The lamps are seen, and the first picture is that of a scene without them.
     assert!(!Distance::between(&pictures[0], &pictures[3])?.is_within_bound());
     assert!(pictures[0] == pictures[4]);
+    Ok(())
+}
+
+/// Surfaces that a process of the engine's own lights in one pass.
+const CLAY: MaterialType<[f32; 4]> = MaterialType::new("clay");
+
+struct Clay {
+    shader: String,
+}
+
+impl Clay {
+    fn new(maps: &ShadowMaps) -> Self {
+        let own = "
+            @group(3) @binding(0) var<storage, read> clays: array<vec4<f32>>;
+
+            struct Corner {
+                @builtin(position) clip: vec4<f32>,
+                @location(0) relative: vec3<f32>,
+                @location(1) normal: vec3<f32>,
+                @location(2) @interpolate(flat) material: u32,
+            }
+
+            @vertex
+            fn vertex(in: VertexInput) -> Corner {
+                let object = drawn_object(in.instance);
+                let relative = relative_position(object, in.position);
+                return Corner(clip_position(relative), relative, world_normal(object, in.normal), object.material);
+            }
+
+            @fragment
+            fn fragment(in: Corner) -> @location(0) vec4<f32> {
+                let illuminance = view.ambient * PI + illuminance_at(in.relative, normalize(in.normal));
+                return vec4<f32>(clays[in.material].rgb / PI * illuminance, 1.0);
+            }
+        ";
+        Self { shader: [&lighting_shader(Some((1, maps))), own].concat() }
+    }
+}
+
+impl RenderProcess for Clay {
+    fn name(&self) -> &str {
+        "clay"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.at(InjectionPoint::AfterLighting);
+        declare.samples_layers(ViewKind::Shadow, targets::SHADOW_MAP);
+        declare.draws_over(targets::RADIANCE);
+        declare.draws_depth(targets::DEPTH);
+        declare.reads_materials(CLAY);
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::Commands(CommandDraws {
+            shader: &self.shader,
+            selection: Selection::OPAQUE.of_material_type(CLAY),
+            ..CommandDraws::default()
+        })
+    }
+}
+
+fn lit_surfaces() -> Result<(), Failed> {
+    let (position, casts_shadow, range) = (DVec3::new(1.0, 3.0, 1.5), true, 20.0);
+    let (direction, intensity) = (Vec3::new(-0.4, -1.0, -0.3).normalize(), Vec3::splat(12.0));
+    let lights = [
+        Light::Point { position, intensity, range, casts_shadow },
+        Light::Spot { position, direction, intensity, range, inner_angle: 0.4, outer_angle: 0.6, casts_shadow },
+        Light::Directional { direction, illuminance: Vec3::ONE, casts_shadow },
+        Light::Hemispherical { position, direction, intensity, range, casts_shadow },
+    ];
+    let maps = ShadowMaps { side: 512, cascades: 3, max_distance: 20.0, ..ShadowMaps::default() };
+    let deferred = || Deferred::to_picture().shadow_maps(Some(maps));
+    // One of each kind, all of them, and none.
+    let mut scenes: Vec<Vec<Light>> = lights.iter().map(|light| vec![light.clone()]).collect();
+    scenes.extend([lights.to_vec(), Vec::new()]);
+    for lights in scenes {
+        let mut scene = boxes(0)?;
+        let floor = scene.add(Material { diffuse: Vec3::splat(0.6), ..Material::default() })?;
+        let mesh = scene.assets().iter::<drawloom::scene::Mesh>().map(|(handle, _)| handle).next();
+        let mesh = mesh.ok_or("there is no mesh")?;
+        let object = RenderObject::new(mesh, floor, DVec3::NEG_Y * 1.5);
+        scene.add_object(RenderObject { scale: Vec3::new(20.0, 0.5, 20.0), ..object })?;
+        scene.lights = lights.clone();
+        let materials: Vec<_> = scene.assets().iter::<Material>().map(|(handle, one)| (handle, one.clone())).collect();
+        for (handle, material) in &materials {
+            scene.replace(*handle, Material { blend: Blend::None, emission: Vec3::ZERO, ..material.clone() })?;
+        }
+        let mut shipped = Fixture::with(2, |builder| builder.pipeline(deferred()))?;
+        let expected = as_image(&shipped.draw(&scene)?)?;
+        for (handle, material) in materials {
+            let values = Some(CLAY.values(material.diffuse.extend(1.0).to_array()));
+            scene.replace(handle, Material { blend: Blend::None, values, ..material })?;
+        }
+        let mut own = Fixture::with(2, |builder| builder.pipeline(deferred()).process(Clay::new(&maps)))?;
+        let found = as_image(&own.draw(&scene)?)?;
+        let distance = Distance::between(&found, &expected)?;
+        if !distance.is_within_bound() {
+            return Err(format!("{lights:?}: {distance:?}").into());
+        }
+    }
     Ok(())
 }
 

@@ -28,6 +28,6 @@ use light_sum::LightSum;
 use light_tiles::LightTiles;
 pub use light_volumes::LightVolumes;
 pub use pipeline::Deferred;
-pub use shading::{COLORED_SURFACE_SHADER, ILLUMINATION_SHADER, SURFACE_SHADER};
+pub use shading::{COLORED_SURFACE_SHADER, ILLUMINATION_SHADER, SURFACE_SHADER, lighting_shader};
 pub use shadow_casters::ShadowCasters;
 pub use transparency::Transparency;

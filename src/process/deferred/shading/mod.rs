@@ -8,6 +8,10 @@ mod shadow;
 
 pub(super) use shadow::shadow_shader;
 
+#[cfg(doc)]
+use crate::process::Declare;
+use crate::view::ShadowMaps;
+
 /// The WGSL with which the geometry buffer and transparency draw objects, for processes that replace them. It follows
 /// [`SHADER_PRELUDE`](crate::process::SHADER_PRELUDE), and has the entry point `vertex`.
 ///
@@ -26,6 +30,78 @@ pub const COLORED_SURFACE_SHADER: &str =
 /// The WGSL by which lights illuminate: `illuminance_from(light, position, normal)` is the illuminance of a surface at
 /// a position relative to the camera, without shadows.
 pub const ILLUMINATION_SHADER: &str = include_str!("illumination.wgsl");
+
+/// The WGSL by which surfaces of an engine's own are lit as the shipped ones are, for processes that draw them in one
+/// pass. It follows [`SHADER_PRELUDE`](crate::process::SHADER_PRELUDE), and begins with [`ILLUMINATION_SHADER`].
+///
+/// - `illuminance_at(position, normal)` is the illuminance of a surface by all lights that reach the view, with their
+///   shadows. The ambient light's is `view.ambient * PI`.
+/// - `light_visibility(light, position, normal)` is the fraction of one of the `lights` that reaches a position, from 0
+///   to 1, by the filter and the bias of the maps. It needs no uniform control flow.
+///
+/// Positions are relative to the camera along the world's axes; normals are of unit length, on the visible side.
+///
+/// `maps` are those that the pipeline [draws](crate::process::ShadowCasters), with the number of their binding: the
+/// process [samples their layers](Declare::samples_layers), and the binding is 1 if it samples nothing before them.
+/// `None` is light without shadows.
+///
+/// ```
+/// use drawloom::process::{Declare, Draws, CommandDraws, InjectionPoint, RenderProcess, lighting_shader, targets};
+/// use drawloom::scene::ViewKind;
+/// use drawloom::view::ShadowMaps;
+///
+/// struct Clay {
+///     shader: String,
+/// }
+///
+/// impl Clay {
+///     fn new(maps: &ShadowMaps) -> Self {
+///         Self { shader: [&lighting_shader(Some((1, maps))), CLAY].concat() }
+///     }
+/// }
+///
+/// const CLAY: &str = "
+///     struct Corner {
+///         @builtin(position) clip: vec4<f32>,
+///         @location(0) relative: vec3<f32>,
+///         @location(1) normal: vec3<f32>,
+///     }
+///
+///     @vertex
+///     fn vertex(in: VertexInput) -> Corner {
+///         let object = drawn_object(in.instance);
+///         let relative = relative_position(object, in.position);
+///         return Corner(clip_position(relative), relative, world_normal(object, in.normal));
+///     }
+///
+///     @fragment
+///     fn fragment(in: Corner) -> @location(0) vec4<f32> {
+///         let illuminance = view.ambient * PI + illuminance_at(in.relative, normalize(in.normal));
+///         return vec4<f32>(vec3<f32>(0.6, 0.4, 0.3) / PI * illuminance, 1.0);
+///     }
+/// ";
+///
+/// impl RenderProcess for Clay {
+///     fn name(&self) -> &str {
+///         "clay"
+///     }
+///
+///     fn declare(&self, declare: &mut Declare) {
+///         declare.at(InjectionPoint::AfterLighting);
+///         declare.samples_layers(ViewKind::Shadow, targets::SHADOW_MAP);
+///         declare.draws_over(targets::RADIANCE);
+///         declare.draws_depth(targets::DEPTH);
+///     }
+///
+///     fn draws(&self) -> Draws<'_> {
+///         Draws::Commands(CommandDraws { shader: &self.shader, ..CommandDraws::default() })
+///     }
+/// }
+/// # assert!(Clay::new(&ShadowMaps::default()).shader.contains("illuminance_at"));
+/// ```
+pub fn lighting_shader(maps: Option<(u32, &ShadowMaps)>) -> String {
+    [ILLUMINATION_SHADER, &shadow_shader(maps), include_str!("light_loop.wgsl")].join("\n")
+}
 
 /// WGSL that sums light in batches.
 pub(super) const LIGHT_BATCHES_SHADER: &str = include_str!("light_batches.wgsl");
