@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::sync::Arc;
 
-use drawloom::scene::Texture;
 use drawloom::task::{BackgroundJob, JobPanic, Scheduler};
 use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits, RgbaImage, imageops};
 
@@ -162,12 +161,15 @@ fn decode(encoded: &Encoded) -> Result<Decoded, String> {
     Ok(Decoded { image: reduced, reduced_from: Some(size) })
 }
 
+/// What usual devices allow to a side of a texture.
+const MAX_SIDE: u32 = 8192;
+
 /// The size of an image as a texture, if it is too large for one.
 fn reduced_size(size: [u32; 2]) -> Option<[u32; 2]> {
     let greatest = size[0].max(size[1]);
     let reduced = |side: u32| {
-        let side = u64::from(side) * u64::from(Texture::MAX_SIZE) / u64::from(greatest);
+        let side = u64::from(side) * u64::from(MAX_SIDE) / u64::from(greatest);
         side.max(1) as u32
     };
-    (greatest > Texture::MAX_SIZE).then(|| size.map(reduced))
+    (greatest > MAX_SIDE).then(|| size.map(reduced))
 }

@@ -31,8 +31,7 @@
 //! - `transforms`, `nodes`, `keyframes`, `animations`: where nodes are;
 //! - `attributes`, `triangles`, `vertex_joints`, `morph_targets`, `primitives`, `skins`, `poses`: meshes and their
 //!   shapes;
-//! - `surface`, `surface_kind`, `jpeg`, `images`, `mip_levels`, `array_sizes`, `texture_arrays`, `texture_slots`,
-//!   `materials`: surfaces;
+//! - `surface`, `surface_kind`, `jpeg`, `images`, `textures`, `texture_slots`, `materials`: surfaces;
 //! - `cameras`, `lights`, `world`, `parts`, `world_builder`, `progress`, `loader`: the scene;
 //! - `draw`: how it is drawn.
 
@@ -66,9 +65,7 @@ mod surface;
 mod surface_kind;
 mod jpeg;
 mod images;
-mod mip_levels;
-mod array_sizes;
-mod texture_arrays;
+mod textures;
 mod texture_slots;
 mod materials;
 mod poses;

@@ -48,7 +48,7 @@ pub struct GltfLimits {
     /// Background jobs decode several images at once. Default: 1 GiB.
     pub texture_bytes: u64,
     /// The bytes that all images take together: those of their files, also if they cannot be decoded, and 4 for each
-    /// pixel. The texture arrays that are made of them, with mip levels, take as much again at most. Default: 1 GiB.
+    /// pixel. The textures that are made of them, with mip levels, take as much again at most. Default: 1 GiB.
     pub all_textures_bytes: u64,
     /// The warnings that are listed. All are counted. Default: 100.
     pub warnings: u64,

@@ -1,7 +1,7 @@
 //! The loader: from a file to a world.
 
-use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use drawloom::glam::DAffine3;
@@ -16,14 +16,12 @@ use crate::files::read_file;
 use crate::images::Decoding;
 use crate::json::Json;
 use crate::limits::{GltfLimits, Limit};
-use crate::materials::read_material;
+use crate::materials::{ReadMaterial, read_material};
 use crate::nodes::Nodes;
 use crate::parts::{Parts, PrimitivesOfMeshes};
 use crate::primitives::{Primitive, read_primitive};
 use crate::progress::{Progress, StepCounter};
 use crate::skins::Skin;
-use crate::surface::Surface;
-use crate::texture_arrays::{TextureArrays, TextureUses};
 use crate::warnings::Warnings;
 use crate::world::World;
 use crate::world_builder::WorldBuilder;
@@ -111,23 +109,22 @@ fn read(
     let nodes: Vec<_> = of_scene.iter().filter_map(placed).collect();
 
     let meshes = meshes_of(source, &nodes, warnings)?;
-    let mut uses = TextureUses::default();
-    let materials = materials_of(source, &meshes, &mut uses, warnings)?;
+    let materials = materials_of(source, &meshes, warnings)?;
     // What follows may be a problem of the file: the images are not decoded for that.
     let (primitives, morphs) = primitives_of(source, &meshes, warnings)?;
     warn_of_bumps(&primitives, &materials, warnings);
     let skins = skins_of(source, &nodes, warnings)?;
-    let decoding = Decoding::start(source, uses.images(), scheduler, warnings);
-    // Each is decoded, and then made a layer of a texture array, perhaps several times.
-    let mut steps = StepCounter::new(decoding.count() + uses.count(), progress);
+    let used: BTreeSet<_> =
+        materials.values().flat_map(|material| material.textures).flatten().map(|used| used.image).collect();
+    let decoding = Decoding::start(source, used, scheduler, warnings);
+    let mut steps = StepCounter::new(decoding.count(), progress);
     let images = decoding.wait(&mut steps, warnings);
-    let textures = TextureArrays::new(&uses, images, &options.limits, scheduler, &mut steps, warnings);
     let parts = Parts { source, nodes, world, weights, target_counts, primitives, skins, materials };
-    let mut builder = WorldBuilder::new(&parts, morphs, &textures, warnings)?;
+    let mut builder = WorldBuilder::new(&parts, morphs, (&images, &options.limits), warnings)?;
     builder.add_objects()?;
     builder.add_lights()?;
     builder.add_camera(options.camera, options.size)?;
-    Ok(builder.finish(textures))
+    Ok(builder.finish())
 }
 
 fn animate(
@@ -169,19 +166,18 @@ fn meshes_of<'a>(
 fn materials_of(
     source: &Source,
     meshes: &BTreeMap<usize, Element<'_>>,
-    uses: &mut TextureUses,
     warnings: &mut Warnings,
-) -> Result<BTreeMap<Option<usize>, (String, Surface)>, Problem> {
+) -> Result<BTreeMap<Option<usize>, ReadMaterial>, Problem> {
     let nothing = Json::Object(Box::default());
     let mut materials = BTreeMap::new();
-    let default = read_material(source, &Element::new(&nothing, Kind::Material, 0), uses, warnings)?;
-    materials.insert(None, ("the default material".to_owned(), default));
+    let name = "the default material".to_owned();
+    materials.insert(None, read_material(source, &Element::new(&nothing, Kind::Material, 0), name, warnings)?);
     for mesh in meshes.values() {
         for json in mesh.list("primitives").unwrap_or_default() {
             let index = json.get("material").and_then(Json::as_index);
             let Some(material) = index.and_then(|index| source.get(Kind::Material, index)) else { continue };
             if let Entry::Vacant(entry) = materials.entry(index) {
-                entry.insert((material.to_string(), read_material(source, &material, uses, warnings)?));
+                entry.insert(read_material(source, &material, material.to_string(), warnings)?);
             }
         }
     }
@@ -229,10 +225,10 @@ fn skins_of(
 /// Tangents that a file leaves out are those of MikkTSpace, by the specification; here the shader derives them.
 fn warn_of_bumps(
     primitives: &PrimitivesOfMeshes,
-    materials: &BTreeMap<Option<usize>, (String, Surface)>,
+    materials: &BTreeMap<Option<usize>, ReadMaterial>,
     warnings: &mut Warnings,
 ) {
-    let has_bumps = |primitive: &&Primitive| materials.get(&primitive.material).is_some_and(|(_, it)| it.has_bumps());
+    let has_bumps = |primitive: &&Primitive| materials.get(&primitive.material).is_some_and(ReadMaterial::has_bumps);
     let mut with_bumps = primitives.values().flatten().filter(has_bumps);
     if let Some(primitive) = with_bumps.find(|primitive| !primitive.has_tangents) {
         let reason = "has no tangents for its texture of normals: they are derived from the picture, not by MikkTSpace";

@@ -5,27 +5,42 @@ use drawloom::glam::Vec3;
 use crate::document::Source;
 use crate::element::Element;
 use crate::error::Problem;
-use crate::mip_levels::ColorSpace;
-use crate::surface::{BLENDED, DOUBLE_SIDED, EMPTY_SLOT, Surface, UNLIT};
-use crate::texture_arrays::TextureUses;
+use crate::surface::{BLENDED, DOUBLE_SIDED, PLAIN_SLOT, Surface, TEXTURES, UNLIT};
 use crate::texture_slots::SlotReader;
+use crate::textures::{ColorSpace, TextureUse};
 use crate::warnings::Warnings;
 
 /// The greatest factor of a colour. A brighter one is drawn as bright.
 const MAX_FACTOR: f32 = 1e30;
 
-/// Reads a material, and adds the images that it uses. What is wrong with one of its values is a warning, and the value
-/// is the default one.
+/// A material as a file has it.
+pub(crate) struct ReadMaterial {
+    /// In messages.
+    pub(crate) name: String,
+    pub(crate) surface: Surface,
+    /// The textures, in the order of the surface's.
+    pub(crate) textures: [Option<TextureUse>; TEXTURES],
+}
+
+impl ReadMaterial {
+    /// Whether it has a texture of normals.
+    pub(crate) fn has_bumps(&self) -> bool {
+        self.textures[2].is_some()
+    }
+}
+
+/// Reads a material, which messages call by a name. What is wrong with one of its values is a warning, and the value is
+/// the default one.
 ///
 /// # Errors
 /// If a limit is exceeded.
 pub(crate) fn read_material(
     source: &Source,
     material: &Element<'_>,
-    uses: &mut TextureUses,
+    name: String,
     warnings: &mut Warnings,
-) -> Result<Surface, Problem> {
-    let mut reader = MaterialReader { material, uses, warnings };
+) -> Result<ReadMaterial, Problem> {
+    let mut reader = MaterialReader { material, warnings };
     let pbr = reader.keep(material.object("pbrMetallicRoughness"), "is drawn with default factors")?.flatten();
     let [metallic, roughness] =
         [reader.factor(pbr, "metallicFactor", 1.0, 1.0)?, reader.factor(pbr, "roughnessFactor", 1.0, 1.0)?];
@@ -42,11 +57,12 @@ pub(crate) fn read_material(
         (occlusion, ColorSpace::Linear),
         (reader.info(Some(*material), "emissiveTexture")?, ColorSpace::Srgb),
     ];
-    let mut textures = [EMPTY_SLOT; 5];
-    for (slot, (info, space)) in textures.iter_mut().zip(infos) {
-        if let Some(info) = info {
-            let read = SlotReader { source, uses: reader.uses, warnings: reader.warnings }.slot(&info, space);
-            *slot = reader.keep(read, "is drawn without a texture")?.unwrap_or(EMPTY_SLOT);
+    let (mut slots, mut textures) = ([PLAIN_SLOT; TEXTURES], [None; TEXTURES]);
+    for (place, (info, space)) in infos.into_iter().enumerate() {
+        let Some(info) = info else { continue };
+        let read = SlotReader { source, warnings: reader.warnings }.slot(&info, space);
+        if let Some((slot, used)) = reader.keep(read, "is drawn without a texture")? {
+            (slots[place], textures[place]) = (slot, Some(used));
         }
     }
     let alpha_mode = reader.keep(material.text("alphaMode"), "is drawn without holes")?.flatten().unwrap_or("OPAQUE");
@@ -56,7 +72,7 @@ pub(crate) fn read_material(
     let cutoff = reader.factor(Some(*material), "alphaCutoff", 0.5, MAX_FACTOR)?;
     let double_sided = reader.keep(material.flag("doubleSided"), "is drawn from its front")?.flatten().unwrap_or(false);
     let flag = |flag: u32, is_set: bool| if is_set { flag } else { 0 };
-    Ok(Surface {
+    let surface = Surface {
         base_color,
         emission: emission.to_array(),
         // A cut-off of 0 has no holes.
@@ -69,13 +85,13 @@ pub(crate) fn read_material(
             | flag(DOUBLE_SIDED, double_sided)
             | flag(BLENDED, alpha_mode == "BLEND"),
         padding: [0; 3],
-        textures,
-    })
+        textures: slots,
+    };
+    Ok(ReadMaterial { name, surface, textures })
 }
 
 struct MaterialReader<'a, 'r> {
     material: &'r Element<'a>,
-    uses: &'r mut TextureUses,
     warnings: &'r mut Warnings,
 }
 

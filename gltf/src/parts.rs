@@ -6,9 +6,9 @@ use drawloom::glam::DAffine3;
 
 use crate::document::Source;
 use crate::element::Element;
+use crate::materials::ReadMaterial;
 use crate::primitives::Primitive;
 use crate::skins::Skin;
-use crate::surface::Surface;
 
 /// The primitives of meshes, by the index of each mesh.
 pub(crate) type PrimitivesOfMeshes = BTreeMap<usize, Vec<Primitive>>;
@@ -29,5 +29,5 @@ pub(crate) struct Parts<'a> {
     /// The skins of the nodes of the scene. Those with which something is wrong are missing.
     pub(crate) skins: BTreeMap<usize, Skin>,
     /// By index; `None` for the default material.
-    pub(crate) materials: BTreeMap<Option<usize>, (String, Surface)>,
+    pub(crate) materials: BTreeMap<Option<usize>, ReadMaterial>,
 }

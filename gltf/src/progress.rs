@@ -1,6 +1,6 @@
 //! How far loading is.
 
-/// How far loading is. What takes long is to decode images and to make their mip levels, so these are the steps.
+/// How far loading is. What takes long is to decode images, so each is a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Progress {

@@ -1,30 +1,26 @@
 //! Textures of materials: which image, how it is placed, filtered and wrapped.
 
 use drawloom::glam::{Mat2, Vec2};
+use drawloom::scene::{Filter, Outside, Sampler};
 
 use crate::document::Source;
 use crate::element::{Element, Kind};
 use crate::error::Problem;
-use crate::mip_levels::ColorSpace;
-use crate::surface::{
-    EMPTY_SLOT, MAGNIFIED_NEAREST, MINIFIED_NEAREST, NEAREST_MIP_LEVEL, SECOND_COORDINATES, TextureSlot,
-    WITHOUT_MIP_LEVELS,
-};
-use crate::texture_arrays::{TextureUse, TextureUses};
+use crate::surface::{PLAIN_SLOT, TextureSlot};
+use crate::textures::{ColorSpace, TextureUse};
 use crate::warnings::Warnings;
 
 pub(crate) struct SlotReader<'r> {
     pub(crate) source: &'r Source,
-    pub(crate) uses: &'r mut TextureUses,
     pub(crate) warnings: &'r mut Warnings,
 }
 
 impl SlotReader<'_> {
-    /// Reads what a material says of a texture.
+    /// Reads what a material says of a texture: how it is placed, and which it is.
     ///
     /// # Errors
     /// If its texture coordinates are not read, or it has no image.
-    pub(crate) fn slot(&mut self, info: &Element<'_>, space: ColorSpace) -> Result<TextureSlot, Problem> {
+    pub(crate) fn slot(&mut self, info: &Element<'_>, space: ColorSpace) -> Result<(TextureSlot, TextureUse), Problem> {
         let transform = info.extension("KHR_texture_transform");
         let of_transform = transform.map_or(Ok(None), |transform| transform.index("texCoord"))?;
         let coordinates = of_transform.map_or_else(|| info.index("texCoord"), |set| Ok(Some(set)))?.unwrap_or(0);
@@ -36,55 +32,61 @@ impl SlotReader<'_> {
         let Some(image) = self.source.member(&texture, "source", Kind::Image)? else {
             return Err(Problem::invalid(texture, "has no image of a format that is read"));
         };
-        let mut flags = if coordinates == 1 { SECOND_COORDINATES } else { 0 };
-        flags |= self.sampler_flags(&texture)?;
-        let mut slot = EMPTY_SLOT;
+        let sampler = self.sampler(&texture)?;
+        let mut slot = TextureSlot { coordinates: coordinates as u32, ..PLAIN_SLOT };
         if let Some(transform) = transform {
             let lost = format_args!("{info} is drawn without the transform of a texture");
             let placed = self.warnings.keep(matrix_of(&transform), lost)?;
             (slot.matrix, slot.offset) = placed.unwrap_or((slot.matrix, slot.offset));
         }
-        let texture = self.uses.add(TextureUse { image: image.index, space });
-        Ok(TextureSlot { texture, flags, ..slot })
+        Ok((slot, TextureUse { image: image.index, space, sampler }))
     }
 
     /// How a texture is filtered and wrapped: smoothly with mip levels, and repeated, unless its sampler says
     /// otherwise.
-    fn sampler_flags(&mut self, texture: &Element<'_>) -> Result<u32, Problem> {
+    fn sampler(&mut self, texture: &Element<'_>) -> Result<Sampler, Problem> {
         let read = self.source.member(texture, "sampler", Kind::Sampler);
         let lost = format_args!("{texture} is drawn with the default sampler");
-        let Some(sampler) = self.warnings.keep(read, lost)?.flatten() else { return Ok(0) };
-        let mut choose = |member: &str, choices: &[(usize, u32)]| {
-            let lost = format_args!("{sampler} is drawn with the default {member}");
-            let Some(number) = self.warnings.keep(sampler.index(member), lost)?.flatten() else { return Ok(0) };
-            match choices.iter().find(|(of_choice, _)| *of_choice == number) {
-                Some((_, flags)) => Ok(*flags),
-                None => {
-                    let warning =
-                        format!("has the {member} {number}, which is not known, and is drawn with the default");
-                    self.warnings.add(format!("{sampler} {warning}"));
-                    Ok(0)
-                }
-            }
-        };
-        let magnified = choose("magFilter", &[(9728, MAGNIFIED_NEAREST), (9729, 0)])?;
-        let minified = choose(
-            "minFilter",
-            &[
-                (9728, MINIFIED_NEAREST | WITHOUT_MIP_LEVELS),
-                (9729, WITHOUT_MIP_LEVELS),
-                (9984, MINIFIED_NEAREST | NEAREST_MIP_LEVEL),
-                (9985, NEAREST_MIP_LEVEL),
-                (9986, MINIFIED_NEAREST),
-                (9987, 0),
-            ],
-        )?;
-        let wraps = [(10497, 0), (33071, 1), (33648, 2)];
-        let wrapped = choose("wrapS", &wraps)? << 8 | choose("wrapT", &wraps)? << 10;
-        // Where the file leaves the choice, pixels that are nearest in one direction are so in the other.
+        let Some(sampler) = self.warnings.keep(read, lost)?.flatten() else { return Ok(Sampler::REPEAT) };
+        let magnified = self.choose(&sampler, "magFilter", &[(9728, Filter::Nearest), (9729, Filter::Linear)])?;
+        let [nearest, linear] = [Filter::Nearest, Filter::Linear];
+        let reduced = [
+            (9728, (nearest, None)),
+            (9729, (linear, None)),
+            (9984, (nearest, Some(nearest))),
+            (9985, (linear, Some(nearest))),
+            (9986, (nearest, Some(linear))),
+            (9987, (linear, Some(linear))),
+        ];
+        let reduced = self.choose(&sampler, "minFilter", &reduced)?;
+        let outside = [(10497, Outside::Repeat), (33071, Outside::Clamp), (33648, Outside::Mirror)];
+        let [across, down] = [self.choose(&sampler, "wrapS", &outside)?, self.choose(&sampler, "wrapT", &outside)?];
+        let magnified = magnified.unwrap_or_default();
+        // Where the file leaves the choice, texels that are nearest in one direction are so in the other.
         let is_free = sampler.json.get("minFilter").is_none();
-        let minified = if is_free && magnified != 0 { MINIFIED_NEAREST } else { minified };
-        Ok(magnified | minified | wrapped)
+        let (reduced, levels) = match reduced {
+            None if is_free => (magnified, Some(linear)),
+            reduced => reduced.unwrap_or((linear, Some(linear))),
+        };
+        let outside = [across.unwrap_or_default(), down.unwrap_or_default()];
+        Ok(Sampler { outside, magnified, reduced, levels, anisotropy: 1 })
+    }
+
+    /// What a member of a sampler chooses; `None` for the default.
+    fn choose<T: Copy>(
+        &mut self,
+        sampler: &Element<'_>,
+        member: &str,
+        choices: &[(usize, T)],
+    ) -> Result<Option<T>, Problem> {
+        let lost = format_args!("{sampler} is drawn with the default {member}");
+        let Some(number) = self.warnings.keep(sampler.index(member), lost)?.flatten() else { return Ok(None) };
+        let chosen = choices.iter().find(|(of_choice, _)| *of_choice == number).map(|(_, chosen)| *chosen);
+        if chosen.is_none() {
+            let warning = format!("has the {member} {number}, which is not known, and is drawn with the default");
+            self.warnings.add(format!("{sampler} {warning}"));
+        }
+        Ok(chosen)
     }
 }
 

@@ -3,11 +3,10 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use drawloom::scene::{Bounds, ColumnValues, Scene, SceneRef};
+use drawloom::scene::{Bounds, ColumnValues, Scene, SceneRef, Texture};
 
 use crate::attributes::{POSE, Pose};
 use crate::surface_kind::SurfaceKind;
-use crate::texture_arrays::TextureArrays;
 
 /// A loaded scene: what Drawloom draws, and what the loader left out of the file. In names of the file, control
 /// characters are escaped.
@@ -20,7 +19,6 @@ pub struct World {
     pub(crate) poses: Vec<Pose>,
     pub(crate) palette: Arc<[u8]>,
     pub(crate) morphs: Arc<[u8]>,
-    pub(crate) textures: TextureArrays,
     /// Which surfaces there are, and whether they are deformed.
     #[cfg_attr(not(feature = "draw"), expect(dead_code, reason = "only drawing needs it"))]
     pub(crate) surfaces: BTreeSet<(SurfaceKind, bool)>,
@@ -41,10 +39,10 @@ impl World {
         self.poses.len()
     }
 
-    /// The bytes of its texture arrays, its joints and its morph targets.
-    pub fn resource_bytes(&self) -> usize {
-        let layers = self.textures.arrays.iter().flat_map(|array| &array.layers);
-        layers.map(Vec::len).sum::<usize>() + self.palette.len() + self.morphs.len()
+    /// The bytes of its textures with their mip levels, its joints and its morph targets.
+    pub fn resource_bytes(&self) -> u64 {
+        let textures = self.scene.assets().iter::<Texture>().map(|(_, texture)| texture.class().bytes());
+        textures.sum::<u64>() + (self.palette.len() + self.morphs.len()) as u64
     }
 
     /// The engine's own data of objects.

@@ -11,13 +11,16 @@ use crate::attributes::{DEFORMED, Pose, RIGID};
 use crate::cameras::{framing_camera, read_camera};
 use crate::element::{Element, Kind};
 use crate::error::{Problem, excerpt};
+use crate::images::NamedImage;
 use crate::json::Json;
 use crate::lights::{default_light, leave_out_shadow, read_light};
+use crate::limits::GltfLimits;
+use crate::materials::ReadMaterial;
 use crate::parts::Parts;
 use crate::poses::{Posed, Poses, Posing};
 use crate::primitives::Primitive;
 use crate::surface_kind::SurfaceKind;
-use crate::texture_arrays::TextureArrays;
+use crate::textures::add_textures;
 use crate::warnings::Warnings;
 use crate::world::World;
 
@@ -37,27 +40,28 @@ pub(crate) struct WorldBuilder<'a, 'w> {
 }
 
 impl<'a, 'w> WorldBuilder<'a, 'w> {
-    /// Adds meshes and materials. `morphs` has the numbers of all morph targets.
+    /// Adds meshes, textures within the limits, and materials. `morphs` has the numbers of all morph targets.
     ///
     /// # Errors
     /// If a limit is exceeded.
     pub(crate) fn new(
         parts: &'a Parts<'a>,
         morphs: Vec<f32>,
-        textures: &TextureArrays,
+        (images, limits): (&BTreeMap<usize, Arc<NamedImage>>, &GltfLimits),
         warnings: &'w mut Warnings,
     ) -> Result<Self, Problem> {
         let (mut scene, poses) = (Scene::new(), Poses { morphs, ..Poses::default() });
+        let used = parts.materials.values().flat_map(|material| material.textures).flatten();
+        let textures = add_textures(&mut scene, used, images, limits, warnings)?;
         let mut materials = BTreeMap::new();
-        for (&index, (name, surface)) in &parts.materials {
-            let mut surface = *surface;
-            surface.place_textures(|used| textures.place(used));
+        for (&index, ReadMaterial { name, surface, textures: used }) in &parts.materials {
             let kind = match (surface.is_masked(), surface.is_blended()) {
                 (true, _) => SurfaceKind::Masked,
                 (false, true) => SurfaceKind::Blended,
                 (false, false) => SurfaceKind::Opaque,
             };
-            let added = scene.add(surface.into_material(name.clone())).map_err(Problem::of_scene(name));
+            let of_material = used.map(|used| textures.get(&used?).copied());
+            let added = scene.add(surface.into_material(name.clone(), of_material)).map_err(Problem::of_scene(name));
             let added = warnings.keep(added, "a material is left out")?;
             materials.extend(added.map(|material| (index, (material, kind))));
         }
@@ -227,7 +231,7 @@ impl<'a, 'w> WorldBuilder<'a, 'w> {
     }
 
     /// The world, still without warnings.
-    pub(crate) fn finish(self, textures: TextureArrays) -> World {
+    pub(crate) fn finish(self) -> World {
         let Poses { mut palette, mut morphs } = self.poses;
         // No buffer is empty.
         palette.push(Mat4::IDENTITY);
@@ -242,7 +246,6 @@ impl<'a, 'w> WorldBuilder<'a, 'w> {
             poses: self.of_objects,
             palette: Arc::from(bytemuck::cast_slice(&palette)),
             morphs: Arc::from(bytemuck::cast_slice(&morphs)),
-            textures,
             surfaces: self.surfaces,
             warnings: Vec::new(),
             unlisted_warnings: 0,

@@ -95,7 +95,7 @@ fn an_error_says_whose_textures_are_too_many_for_a_shader() {
         let (mut renderer, _) = builder.output("color").build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
         let recorded = renderer.record(field(0).as_scene_ref());
         if count == 10 {
-            recorded.unwrap();
+            drop(recorded.unwrap());
             continue;
         }
         let error = recorded.err().unwrap();

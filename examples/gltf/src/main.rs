@@ -111,8 +111,8 @@ fn run(arguments: &Arguments, world: &World, scheduler: Arc<Scheduler>) -> Resul
     let (device, queue) = draw::open_device()?;
     let deferred = Deferred::new().shadow_maps(Some(draw::shadow_maps(world)));
     let deferred = deferred.post(ToneMapping::new(arguments.exposure)).post(Fxaa::default());
-    let builder = Renderer::builder(WgpuBackend::new(device.clone(), queue.clone())?);
-    let builder = draw::add_world(builder, deferred, (&device, &queue), world)?;
+    let builder = Renderer::builder(WgpuBackend::new(device, queue)?);
+    let builder = draw::add_world(builder, deferred, world);
     let (mut renderer, submitter) = builder.build(scheduler)?;
     let recorded = renderer.record(world.as_scene_ref(&world.columns()))?;
     let picture = submitter.submit(recorded)?.submission.read(0, targets::PICTURE)?;

@@ -22,8 +22,8 @@
 //!         .shadow_maps(Some(draw::shadow_maps(world)))
 //!         .post(ToneMapping::new(1.0))
 //!         .post(Fxaa::default());
-//!     let builder = Renderer::builder(WgpuBackend::new(device.clone(), queue.clone())?);
-//!     let builder = draw::add_world(builder, deferred, (&device, &queue), world)?;
+//!     let builder = Renderer::builder(WgpuBackend::new(device, queue)?);
+//!     let builder = draw::add_world(builder, deferred, world);
 //!     let (mut renderer, submitter) = builder.build(scheduler)?;
 //!     let recorded = renderer.record(world.as_scene_ref(&world.columns()))?;
 //!     Ok(submitter.submit(recorded)?.submission.read(0, targets::PICTURE)?)
@@ -32,7 +32,6 @@
 
 mod deformation;
 mod device;
-mod device_textures;
 mod error;
 mod processes;
 mod surfaces;

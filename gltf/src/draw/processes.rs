@@ -2,32 +2,21 @@
 
 use std::sync::Arc;
 
+use drawloom::RendererBuilder;
 use drawloom::backend::Backend;
 use drawloom::process::{Deferred, RenderProcess};
 use drawloom::view::ShadowMaps;
-use drawloom::{RendererBuilder, wgpu};
 
 use super::deformation::SkinsAndMorphs;
-use super::device_textures::upload;
-use super::error::DrawError;
 use super::surfaces::Surfaces;
 use crate::surface_kind::SurfaceKind;
 use crate::world::World;
 
 /// Adds to a renderer what draws a world: `deferred` as its pipeline, with the world's deformation, and a process for
-/// each kind of surface. The textures are uploaded to the device, which is that of the builder's backend.
+/// each kind of surface.
 ///
 /// The renderer draws this world only: another one needs another renderer.
-///
-/// # Errors
-/// If the device cannot have the textures.
-pub fn add_world<B: Backend>(
-    builder: RendererBuilder<B>,
-    mut deferred: Deferred,
-    (device, queue): (&wgpu::Device, &wgpu::Queue),
-    world: &World,
-) -> Result<RendererBuilder<B>, DrawError> {
-    let textures = upload(device, queue, &world.textures)?;
+pub fn add_world<B: Backend>(builder: RendererBuilder<B>, mut deferred: Deferred, world: &World) -> RendererBuilder<B> {
     let deformation = |material_bindings| {
         SkinsAndMorphs::new(Arc::clone(&world.palette), Arc::clone(&world.morphs), material_bindings)
     };
@@ -44,7 +33,7 @@ pub fn add_world<B: Backend>(
     let mut builder = builder.pipeline(deferred);
     let (mut previous, mut previous_casters) = (None, last);
     for &(kind, is_deformed) in &world.surfaces {
-        let draw = |kind, after| Surfaces::new(kind, is_deformed.then(|| deformation(1)), &textures, after);
+        let draw = |kind, after| Surfaces::new(kind, is_deformed.then(|| deformation(1)), after);
         if kind == SurfaceKind::Masked {
             let casters = draw(SurfaceKind::MaskedCasters, previous_casters);
             previous_casters = Some(casters.name().to_owned());
@@ -54,7 +43,7 @@ pub fn add_world<B: Backend>(
         previous = Some(surfaces.name().to_owned());
         builder = builder.process(surfaces);
     }
-    Ok(builder)
+    builder
 }
 
 /// Shadow maps that cover a world as its camera sees it, for [`Deferred::shadow_maps`].

@@ -8,7 +8,6 @@ use drawloom::process::{
 use drawloom::scene::ViewKind;
 
 use super::deformation::SkinsAndMorphs;
-use crate::array_sizes::ARRAYS;
 use crate::attributes::{COLOR, DEFORMED, RIGID, SECOND_UV, TANGENT};
 use crate::surface::{MASKED_SURFACE, SURFACE};
 use crate::surface_kind::SurfaceKind;
@@ -25,29 +24,17 @@ pub(crate) struct Surfaces {
 }
 
 impl Surfaces {
-    /// With the textures and samplers of [`TextureArrays`](crate::texture_arrays::TextureArrays). Processes that draw
-    /// into one target need an order: this one comes after `previous`.
-    pub(crate) fn new(
-        kind: SurfaceKind,
-        deformation: Option<SkinsAndMorphs>,
-        textures: &[ShaderResource<'static>],
-        previous: Option<String>,
-    ) -> Self {
+    /// Processes that draw into one target need an order: this one comes after `previous`.
+    pub(crate) fn new(kind: SurfaceKind, deformation: Option<SkinsAndMorphs>, previous: Option<String>) -> Self {
         let of_deformation = deformation.as_ref().map(|deformation| deformation.resources().into_iter().map(owned));
+        let resources = of_deformation.into_iter().flatten().collect();
         // After the column of poses.
         let materials = u32::from(deformation.is_some());
-        let own: Vec<_> = of_deformation.into_iter().flatten().collect();
-        let bindings = bindings(materials, materials + 1 + own.len() as u32);
-        let shader = [
-            ILLUMINATION_SHADER,
-            include_str!("shadows.wgsl"),
-            &bindings,
-            include_str!("textures.wgsl"),
-            include_str!("surfaces.wgsl"),
-        ];
+        let binding =
+            format!("@group(3) @binding({materials}) var<storage, read> gltf_materials: array<GltfMaterial>;");
+        let shader = [ILLUMINATION_SHADER, include_str!("shadows.wgsl"), &binding, include_str!("surfaces.wgsl")];
         let of = if deformation.is_some() { "deformed surfaces" } else { "surfaces" };
         let name = format!("{kind:?} {of}").to_lowercase();
-        let resources = own.into_iter().chain(textures.iter().cloned()).collect();
         Self { name, kind, deformation, previous, shader: shader.join("\n"), resources }
     }
 }
@@ -106,21 +93,6 @@ impl RenderProcess for Surfaces {
             ..CommandDraws::default()
         })
     }
-}
-
-/// The declarations of the materials' and the textures' bindings.
-fn bindings(materials: u32, textures: u32) -> String {
-    let mut bindings =
-        format!("@group(3) @binding({materials}) var<storage, read> gltf_materials: array<GltfMaterial>;\n");
-    let arrays = ["colors", "numbers"].into_iter().flat_map(|name| (0..ARRAYS).map(move |array| (name, array)));
-    for (binding, (name, array)) in (textures..).zip(arrays) {
-        bindings += &format!("@group(3) @binding({binding}) var {name}_{array}: texture_2d_array<f32>;\n");
-    }
-    let samplers = textures + 2 * ARRAYS as u32;
-    for (binding, name) in (samplers..).zip(["smooth_pixels", "nearest_pixel"]) {
-        bindings += &format!("@group(3) @binding({binding}) var {name}: sampler;\n");
-    }
-    bindings
 }
 
 /// Resources whose bytes are shared borrow nothing.

@@ -1,14 +1,9 @@
 struct TextureSlot {
     matrix: vec4<f32>,
     offset: vec2<f32>,
-    // The array above the layer; all ones for no texture.
-    texture: u32,
-    // 1: the second texture coordinates; 2 and 4: the nearest pixel where the image is magnified and minified; 8: no
-    // mip levels; 16: the nearest mip level; two bits each from bit 8 on: how u and v wrap.
-    flags: u32,
-    // Of the image in pixels: it fills the layer, or its upper left.
-    size: vec2<u32>,
-    padding: vec2<u32>,
+    // 1 for the second texture coordinates.
+    coordinates: u32,
+    padding: u32,
 }
 
 struct GltfMaterial {
@@ -29,6 +24,13 @@ struct GltfMaterial {
     occlusion_texture: TextureSlot,
     emission_texture: TextureSlot,
 }
+
+// The places of the textures in Drawloom's materials.
+const BASE_COLOR: u32 = 0u;
+const METALLIC_ROUGHNESS: u32 = 1u;
+const NORMAL: u32 = 2u;
+const OCCLUSION: u32 = 3u;
+const EMISSION: u32 = 4u;
 
 const UNLIT: u32 = 1u;
 const DOUBLE_SIDED: u32 = 2u;
@@ -85,8 +87,25 @@ fn caster(in: Corner) {
 fn is_hole(in: Corner, material: GltfMaterial) -> bool {
     let first = Coordinates(in.uv, vec2<f32>(0.0), vec2<f32>(0.0));
     let second = Coordinates(in.second_uv, vec2<f32>(0.0), vec2<f32>(0.0));
-    let texel = color_texel(material.base_color_texture, AllCoordinates(first, second));
+    let used = placed(material.base_color_texture, AllCoordinates(first, second));
+    let texel = texture_in_full(materials[in.material], BASE_COLOR, used.uv);
     return material.base_color.a * in.color.a * texel.a < material.alpha_cutoff;
+}
+
+// A texture of a fragment's material.
+fn texel(in: Corner, place: u32, slot: TextureSlot, coordinates: AllCoordinates) -> vec4<f32> {
+    let used = placed(slot, coordinates);
+    return texture_at(materials[in.material], place, used.uv, used.uv_dx, used.uv_dy);
+}
+
+// Where a texture is sampled.
+fn placed(slot: TextureSlot, coordinates: AllCoordinates) -> Coordinates {
+    var used = coordinates.first;
+    if slot.coordinates == 1u {
+        used = coordinates.second;
+    }
+    let matrix = mat2x2<f32>(slot.matrix.xy, slot.matrix.zw);
+    return Coordinates(matrix * used.uv + slot.offset, matrix * used.uv_dx, matrix * used.uv_dy);
 }
 
 @fragment
@@ -99,7 +118,7 @@ fn fragment(in: Corner) -> @location(0) vec4<f32> {
     let second = Coordinates(in.second_uv, dpdx(in.second_uv), dpdy(in.second_uv));
     let coordinates = AllCoordinates(first, second);
 
-    let base = material.base_color * in.color * color_texel(material.base_color_texture, coordinates);
+    let base = material.base_color * in.color * texel(in, BASE_COLOR, material.base_color_texture, coordinates);
     if material.alpha_cutoff > 0.0 && is_hole(in, material) {
         discard;
     }
@@ -119,11 +138,12 @@ fn fragment(in: Corner) -> @location(0) vec4<f32> {
         outward = -outward;
     }
 
-    let surface = number_texel(material.metallic_roughness_texture, coordinates);
+    let surface = texel(in, METALLIC_ROUGHNESS, material.metallic_roughness_texture, coordinates);
     let metallic = clamp(material.metallic * surface.b, 0.0, 1.0);
     let roughness = clamp(material.roughness * surface.g, 0.045, 1.0);
-    let occlusion = mix(1.0, number_texel(material.occlusion_texture, coordinates).r, material.occlusion_strength);
-    let emission = material.emission * color_texel(material.emission_texture, coordinates).rgb;
+    let occluded = texel(in, OCCLUSION, material.occlusion_texture, coordinates).r;
+    let occlusion = mix(1.0, occluded, material.occlusion_strength);
+    let emission = material.emission * texel(in, EMISSION, material.emission_texture, coordinates).rgb;
     let head_on = mix(vec3<f32>(0.04), base.rgb, metallic);
     let diffuse = base.rgb * (1.0 - metallic);
 
@@ -168,11 +188,11 @@ fn bumped_normal(
     relative_dy: vec3<f32>,
 ) -> vec3<f32> {
     let slot = material.normal_texture;
-    if slot.texture == 0xffffffffu {
+    if !has_texture(materials[in.material], NORMAL) {
         return normal;
     }
-    let texel = number_texel(slot, coordinates).xyz * 2.0 - 1.0;
-    let bump = vec3<f32>(texel.xy * material.normal_scale, texel.z);
+    let tilted = texel(in, NORMAL, slot, coordinates).xyz * 2.0 - 1.0;
+    let bump = vec3<f32>(tilted.xy * material.normal_scale, tilted.z);
     var along_u = in.tangent.xyz;
     var sign = in.tangent.w;
     if sign == 0.0 {

@@ -77,8 +77,8 @@ pub fn draw_world(name: &str, world: &World) -> Result<Drawn, Failed> {
 fn picture_of((device, queue): (wgpu::Device, wgpu::Queue), world: &World) -> Result<Picture, Box<dyn Error>> {
     let deferred = Deferred::new().shadow_maps(Some(draw::shadow_maps(world)));
     let deferred = deferred.post(ToneMapping::new(1.0)).post(Fxaa::default());
-    let builder = Renderer::builder(WgpuBackend::new(device.clone(), queue.clone())?);
-    let builder = draw::add_world(builder, deferred, (&device, &queue), world)?;
+    let builder = Renderer::builder(WgpuBackend::new(device, queue)?);
+    let builder = draw::add_world(builder, deferred, world);
     let (mut renderer, submitter) = builder.build(Arc::clone(&SCHEDULER))?;
     let recorded = renderer.record(world.as_scene_ref(&world.columns()))?;
     Ok(submitter.submit(recorded)?.submission.read(0, "picture")?)

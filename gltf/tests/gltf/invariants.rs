@@ -51,7 +51,7 @@ pub fn check_world(world: &World, limits: &GltfLimits) -> Result<(), String> {
         expect(is_in_range && indices.len().is_multiple_of(3), || format!("{} has wrong indices", mesh.name()))?;
     }
     expect(geometry <= limits.geometry_bytes, || format!("{geometry} bytes of geometry"))?;
-    let resources = world.resource_bytes() as u64;
+    let resources = world.resource_bytes();
     // A matrix and a number are there without a file that has any.
     let greatest = limits.pose_bytes + limits.geometry_bytes + limits.all_textures_bytes + 68;
     expect(resources <= greatest, || format!("{resources} bytes of textures, joints and morph targets"))?;
