@@ -43,6 +43,7 @@ mod mask_shadows;
 mod masks;
 mod materials;
 mod mip_levels;
+mod moving_in;
 mod multisampling;
 mod view_filter;
 mod static_groups;
@@ -129,6 +130,7 @@ fn main() {
         (masks::CASES, Needs::Adapter),
         (materials::CASES, Needs::Adapter),
         (mip_levels::CASES, Needs::Adapter),
+        (moving_in::CASES, Needs::Adapter),
         (multisampling::CASES, Needs::Adapter),
         (view_filter::CASES, Needs::Adapter),
         (static_groups::CASES, Needs::Adapter),
