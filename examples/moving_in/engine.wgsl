@@ -8,13 +8,13 @@ struct View {
     size: vec4<f32>,
 }
 
-struct Object {
+struct Instance {
     world_from_object: mat4x4<f32>,
     tint: vec4<f32>,
 }
 
 @group(0) @binding(0) var<uniform> view: View;
-@group(0) @binding(1) var<storage, read> objects: array<Object>;
+@group(0) @binding(1) var<storage, read> instances: array<Instance>;
 
 @group(1) @binding(0) var colors: texture_2d<f32>;
 @group(1) @binding(1) var details: texture_2d<f32>;
@@ -39,10 +39,10 @@ fn vertex(
     @location(1) normal: vec3<f32>,
     @location(2) uv: vec2<f32>,
 ) -> Corner {
-    let object = objects[index];
-    let world = object.world_from_object * vec4(position, 1.0);
-    let turned = normalize((object.world_from_object * vec4(normal, 0.0)).xyz);
-    return Corner(view.clip_from_world * world, world.xyz, turned, uv, object.tint.rgb);
+    let instance = instances[index];
+    let world = instance.world_from_object * vec4(position, 1.0);
+    let turned = normalize((instance.world_from_object * vec4(normal, 0.0)).xyz);
+    return Corner(view.clip_from_world * world, world.xyz, turned, uv, instance.tint.rgb);
 }
 
 fn lit(in: Corner, color: vec3<f32>, detail: vec3<f32>, gloss: f32) -> vec3<f32> {

@@ -1,21 +1,24 @@
-//! An engine with pipelines, bind groups and draw calls of its own moves to Drawloom.
+//! An engine with drawables, pipelines and bind groups of its own moves to Drawloom, and draws the same bytes.
 //!
-//!     cargo run --release --example moving_in
-//!     cargo run --release --example moving_in -- --objects 40000 --workers 8 --out moving_in.png
-//!     cargo run --release --example moving_in -- --backend noop
+//!     cargo run --release --example moving_in -- --out moving_in.png
+//!     cargo run --release --example moving_in -- --measure
+//!     cargo run --release --example moving_in -- --measure adapter --objects 40000 --workers 8
 //!
-//! [`engine`] is a small engine as people write them with plain wgpu, and [`on_drawloom`] is the same engine on Drawloom:
-//! not one shader, pipeline or bind group differs. The program draws a frame with both, and ends with exit status 1 if
-//! their bytes differ. Then it measures how long a frame takes on this thread, from the engine's arrays to submission,
-//! and prints medians. In the column *moving* the camera and every eighth object move; in *at rest* nothing does. What
-//! the engine writes into its buffers itself is not measured, as it is the same in both.
+//! The [`engine`] has two renderers: [`on_wgpu`] culls, sorts and records on one thread, as engines do that are written
+//! with plain wgpu. [`on_drawloom`] lends the same drawables to Drawloom. No shader, pipeline, bind group or drawable
+//! knows of it. The program draws a frame with both, and ends with exit status 1 if their bytes differ.
 //!
-//! With `--backend noop` wgpu has no device, so that only the processor's work counts, and there are no bytes to
-//! compare.
+//! With `--measure` it prints the lines of code of both, and how long a frame takes on the calling thread, from the
+//! engine's arrays to submission: medians of frames that both draw in turns. In the column *moving* the camera and
+//! every eighth object move; in *at rest* nothing does. The update of what moves is not measured, as it is the same for
+//! both. By default wgpu has no device then, so only the processor's work counts.
 
-mod content;
+mod drawables;
 mod engine;
 mod on_drawloom;
+mod on_wgpu;
+mod resources;
+mod world;
 
 use std::error::Error;
 use std::num::NonZeroUsize;
@@ -26,23 +29,33 @@ use std::time::{Duration, Instant};
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::{Parser, ValueEnum};
 use drawloom::task::Scheduler;
-use drawloom::wgpu;
+use drawloom::{Granularity, wgpu};
 use drawloom_output::{PictureFile, path_text, print_line};
 use drawloom_testing::adapter;
+use indicatif::{ProgressBar, ProgressStyle};
 
 use engine::{Engine, MAIN, SIZES};
-use on_drawloom::EngineOnDrawloom;
+use on_drawloom::OnDrawloom;
+use on_wgpu::OnWgpu;
 
 /// Frames before those that are measured: in them Drawloom finds out how it records best.
 const WARM_UP: u32 = 60;
 
-/// Draws and measures a plain engine and the same engine on Drawloom.
+/// Draws and measures an engine on plain wgpu and on Drawloom.
 #[derive(Parser)]
 #[command(name = "moving_in")]
 struct Arguments {
-    /// About how many objects the engine has.
+    /// About how many drawables the engine has.
     #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     objects: u32,
+
+    /// Where the picture goes, a .png, .jpg, .tga or .bmp.
+    #[arg(long, value_name = "FILE", value_parser = PathBufValueParser::new().try_map(PictureFile::new))]
+    out: Option<PictureFile>,
+
+    /// Measure frames: `noop` without a device, or `adapter` on the machine's adapter.
+    #[arg(long, value_enum, num_args = 0..=1, default_missing_value = "noop", conflicts_with = "out")]
+    measure: Option<BackendName>,
 
     /// The frames that are measured, for each row and column.
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=100_000))]
@@ -51,14 +64,6 @@ struct Arguments {
     /// Threads that run jobs in the last row, the calling thread included. Default: the number of cores.
     #[arg(long, value_name = "N")]
     workers: Option<NonZeroUsize>,
-
-    /// `adapter` draws on the machine's adapter; `noop` is wgpu without a device.
-    #[arg(long, value_enum, default_value = "adapter")]
-    backend: BackendName,
-
-    /// Where the picture goes, a .png, .jpg, .tga or .bmp.
-    #[arg(long, value_name = "FILE", value_parser = PathBufValueParser::new().try_map(PictureFile::new))]
-    out: Option<PictureFile>,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -72,55 +77,29 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
-    if arguments.backend == BackendName::Noop && arguments.out.is_some() {
-        return Err("--out: with --backend noop there is no picture".into());
-    }
-    let (device, queue) = match arguments.backend {
-        BackendName::Adapter => adapter::device()?,
-        BackendName::Noop => adapter::noop_device()?,
+    let (device, queue) = match arguments.measure {
+        None | Some(BackendName::Adapter) => adapter::device()?,
+        Some(BackendName::Noop) => adapter::noop_device()?,
     };
-    let engine = || Engine::new(device.clone(), queue.clone(), arguments.objects as usize);
-    if arguments.backend == BackendName::Adapter {
-        compare(engine(), engine(), arguments.out.as_ref())?;
-    }
-
-    let cores = std::thread::available_parallelism()?;
-    let mut workers = vec![1, 2, arguments.workers.unwrap_or(cores).get()];
-    workers.sort_unstable();
-    workers.dedup();
-    print_line!("{} objects, 3 views, {}", engine().objects.len(), device.adapter_info().name);
-    print_line!("| µs a frame | moving | at rest |");
-    print_line!("| --- | ---: | ---: |");
-    let mut plain = engine();
-    let draw = |plain: &mut Engine| {
-        plain.draw();
-        Ok(())
-    };
-    print_row("plain engine", measure(arguments.frames, &mut plain, |plain| plain, draw)?);
-    for workers in workers {
-        let mut moved = EngineOnDrawloom::new(engine(), Arc::new(Scheduler::new(workers)?))?;
-        let times = measure(arguments.frames, &mut moved, |moved| &mut moved.engine, |moved| moved.draw())?;
-        let noun = if workers == 1 { "worker" } else { "workers" };
-        print_row(&format!("Drawloom, {workers} {noun}"), times);
-    }
-    Ok(())
+    let engine = Engine::new(device, queue, arguments.objects as usize);
+    if arguments.measure.is_some() { measure(arguments, engine) } else { compare(&engine, arguments.out.as_ref()) }
 }
 
 /// Draws a frame with both.
 ///
 /// # Errors
 /// If their bytes differ.
-fn compare(mut plain: Engine, moved: Engine, out: Option<&PictureFile>) -> Result<(), Box<dyn Error>> {
-    plain.draw();
-    let picture = plain.read_picture()?;
-    let mut moved = EngineOnDrawloom::new(moved, Arc::new(Scheduler::with_available_parallelism()?))?;
-    moved.draw()?;
+fn compare(engine: &Engine, out: Option<&PictureFile>) -> Result<(), Box<dyn Error>> {
+    OnWgpu::default().draw(engine);
+    let expected = engine.read_picture()?;
+    OnDrawloom::new(engine, Arc::new(Scheduler::with_available_parallelism()?), Granularity::default())?
+        .draw(engine)?;
+    let picture = engine.read_picture()?;
     if let Some(file) = out {
         file.write_opaque(SIZES[MAIN], &picture)?;
         print_line!("{} written", path_text(file.path()));
     }
-    let on_drawloom = moved.engine.read_picture()?;
-    let differing = picture.iter().zip(&on_drawloom).filter(|(plain, moved)| plain != moved).count();
+    let differing = picture.iter().zip(&expected).filter(|(one, other)| one != other).count();
     if differing > 0 {
         return Err(format!("{differing} of {} bytes differ between the two", picture.len()).into());
     }
@@ -128,33 +107,83 @@ fn compare(mut plain: Engine, moved: Engine, out: Option<&PictureFile>) -> Resul
     Ok(())
 }
 
-/// The median times of frames in which the world moves, and in which it does not.
-fn measure<T>(
-    frames: u32,
-    drawn: &mut T,
-    engine: impl Fn(&mut T) -> &mut Engine,
-    draw: impl Fn(&mut T) -> Result<(), Box<dyn Error>>,
-) -> Result<[Duration; 2], Box<dyn Error>> {
-    let mut medians = [Duration::ZERO; 2];
-    for (median, moves) in medians.iter_mut().zip([true, false]) {
-        let mut times = Vec::new();
-        for frame in 0..WARM_UP + frames {
-            if moves {
-                engine(drawn).update(frame as f32 * 0.02);
-            }
-            let began = Instant::now();
-            draw(drawn)?;
-            times.push(began.elapsed());
-            engine(drawn).device.poll(wgpu::PollType::wait_indefinitely())?;
-        }
-        times.drain(..WARM_UP as usize);
-        times.sort_unstable();
-        *median = times[times.len() / 2];
+type Draw = Box<dyn FnMut(&Engine) -> Result<(), Box<dyn Error>>>;
+
+/// Prints the lines of code and the times of both.
+fn measure(arguments: &Arguments, mut engine: Engine) -> Result<(), Box<dyn Error>> {
+    let mut on_wgpu = OnWgpu::default();
+    let mut renderers: Vec<(String, Draw)> = vec![(
+        "plain wgpu".into(),
+        Box::new(move |engine| {
+            on_wgpu.draw(engine);
+            Ok(())
+        }),
+    )];
+    let cores = std::thread::available_parallelism()?;
+    let mut workers = vec![1, 2, arguments.workers.unwrap_or(cores).get()];
+    workers.sort_unstable();
+    workers.dedup();
+    for workers in workers {
+        let noun = if workers == 1 { "worker" } else { "workers" };
+        let mut moved = OnDrawloom::new(&engine, Arc::new(Scheduler::new(workers)?), Granularity::default())?;
+        renderers.push((format!("Drawloom, {workers} {noun}"), Box::new(move |engine| moved.draw(engine))));
     }
-    Ok(medians)
+
+    let progress = ProgressBar::new(2 * u64::from(WARM_UP + arguments.frames));
+    progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} frames, {eta} left")?);
+    let moving = median_times(arguments.frames, &mut engine, &mut renderers, true, &progress)?;
+    let at_rest = median_times(arguments.frames, &mut engine, &mut renderers, false, &progress)?;
+    progress.finish_and_clear();
+
+    let shared = [include_str!("engine.rs"), include_str!("drawables.rs"), include_str!("resources.rs")];
+    let [on_wgpu, on_drawloom] = [include_str!("on_wgpu.rs"), include_str!("on_drawloom.rs")].map(lines_of_code);
+    let shared: usize = shared.map(lines_of_code).iter().sum();
+    print_line!("lines of code: {shared} of the engine, {on_wgpu} on plain wgpu, {on_drawloom} on Drawloom");
+    print_line!("{} drawables, 3 views, {}", engine.spheres.len(), engine.device.adapter_info().name);
+    print_line!("| µs a frame | moving | at rest |");
+    print_line!("| --- | ---: | ---: |");
+    for (((name, _), moving), at_rest) in renderers.iter().zip(moving).zip(at_rest) {
+        let [moving, at_rest] = [moving, at_rest].map(|time| time.as_secs_f64() * 1e6);
+        print_line!("| {name} | {moving:.0} | {at_rest:.0} |");
+    }
+    Ok(())
 }
 
-fn print_row(name: &str, times: [Duration; 2]) {
-    let [moving, at_rest] = times.map(|time| time.as_secs_f64() * 1e6);
-    print_line!("| {name} | {moving:.0} | {at_rest:.0} |");
+/// The median time of a frame with each renderer. All draw each frame.
+fn median_times(
+    frames: u32,
+    engine: &mut Engine,
+    renderers: &mut [(String, Draw)],
+    moves: bool,
+    progress: &ProgressBar,
+) -> Result<Vec<Duration>, Box<dyn Error>> {
+    let count = renderers.len();
+    let mut times = vec![Vec::new(); count];
+    for frame in 0..WARM_UP + frames {
+        if moves {
+            engine.update(frame as f32 * 0.02);
+        }
+        // The first one finds the engine's arrays in no cache, so it is another one in each frame.
+        for turn in 0..count {
+            let index = (turn + frame as usize) % count;
+            let began = Instant::now();
+            (renderers[index].1)(engine)?;
+            if frame >= WARM_UP {
+                times[index].push(began.elapsed());
+            }
+            engine.device.poll(wgpu::PollType::wait_indefinitely())?;
+        }
+        progress.inc(1);
+    }
+    Ok(times.into_iter().map(median).collect())
+}
+
+fn median(mut times: Vec<Duration>) -> Duration {
+    times.sort_unstable();
+    times[times.len() / 2]
+}
+
+/// Lines that are neither blank nor comments.
+fn lines_of_code(source: &str) -> usize {
+    source.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with("//")).count()
 }

@@ -1,0 +1,164 @@
+//! What the engine draws: the interface of all drawables, and its kinds.
+
+use std::ops::Range;
+
+use bytemuck::{Pod, Zeroable};
+use glam::{Mat4, Quat, Vec3, Vec4};
+
+use super::engine::{DrawPass, MAIN, MIRROR, SHADOW};
+
+/// What stands in all views.
+pub const ALL_VIEWS: u32 = 1 << SHADOW | 1 << MIRROR | 1 << MAIN;
+
+pub trait Drawable: Send + Sync {
+    /// The material of all its draws, by index.
+    fn material(&self) -> usize;
+
+    /// Its first mesh, by index.
+    fn mesh(&self) -> usize;
+
+    /// The views that may show it: a bit each.
+    fn views(&self) -> u32 {
+        ALL_VIEWS
+    }
+
+    fn bounding_sphere(&self) -> Sphere;
+
+    /// Moves it to where it is at this time, in seconds.
+    fn update(&mut self, _time: f32) {}
+
+    /// Appends what the shaders read of each of its instances. Their number stays the same.
+    fn write_instances(&self, instances: &mut Vec<Instance>);
+
+    /// Draws it. Its instances are these ones of the instance buffer.
+    fn draw(&self, pass: &mut DrawPass<'_, '_>, instances: Range<u32>);
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct Sphere {
+    pub center: Vec3,
+    pub radius: f32,
+}
+
+/// As the shaders have it.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Instance {
+    world_from_object: Mat4,
+    tint: Vec4,
+}
+
+/// An object of one mesh, which stands still.
+#[derive(Clone, Copy)]
+pub struct Prop {
+    pub mesh: usize,
+    pub material: usize,
+    pub views: u32,
+    pub position: Vec3,
+    pub scale: Vec3,
+    pub tint: Vec3,
+}
+
+impl Prop {
+    fn instance(&self) -> Instance {
+        let rotation = Quat::from_rotation_y(self.position.x * 0.7);
+        let world_from_object = Mat4::from_scale_rotation_translation(self.scale, rotation, self.position);
+        Instance { world_from_object, tint: self.tint.extend(1.0) }
+    }
+}
+
+impl Drawable for Prop {
+    fn material(&self) -> usize {
+        self.material
+    }
+
+    fn mesh(&self) -> usize {
+        self.mesh
+    }
+
+    fn views(&self) -> u32 {
+        self.views
+    }
+
+    fn bounding_sphere(&self) -> Sphere {
+        // The corners of all meshes are within a cube from -1 to 1.
+        Sphere { center: self.position, radius: self.scale.length() }
+    }
+
+    fn write_instances(&self, instances: &mut Vec<Instance>) {
+        instances.push(self.instance());
+    }
+
+    fn draw(&self, pass: &mut DrawPass<'_, '_>, instances: Range<u32>) {
+        pass.set_material(self.material);
+        pass.set_mesh(self.mesh);
+        pass.draw(instances);
+    }
+}
+
+/// An object that bobs up and down.
+pub struct Floater {
+    pub prop: Prop,
+    /// In radians.
+    pub phase: f32,
+}
+
+impl Drawable for Floater {
+    fn material(&self) -> usize {
+        self.prop.material
+    }
+
+    fn mesh(&self) -> usize {
+        self.prop.mesh
+    }
+
+    fn bounding_sphere(&self) -> Sphere {
+        self.prop.bounding_sphere()
+    }
+
+    fn update(&mut self, time: f32) {
+        self.prop.position.y = 2.0 + (time + self.phase).sin();
+    }
+
+    fn write_instances(&self, instances: &mut Vec<Instance>) {
+        self.prop.write_instances(instances);
+    }
+
+    fn draw(&self, pass: &mut DrawPass<'_, '_>, instances: Range<u32>) {
+        self.prop.draw(pass, instances);
+    }
+}
+
+/// Plants that are culled as one, and drawn with one instanced draw a mesh.
+pub struct Thicket {
+    /// All have the same material.
+    pub plants: [[Prop; 2]; 2],
+    pub center: Vec3,
+    pub radius: f32,
+}
+
+impl Drawable for Thicket {
+    fn material(&self) -> usize {
+        self.plants[0][0].material
+    }
+
+    fn mesh(&self) -> usize {
+        self.plants[0][0].mesh
+    }
+
+    fn bounding_sphere(&self) -> Sphere {
+        Sphere { center: self.center, radius: self.radius }
+    }
+
+    fn write_instances(&self, instances: &mut Vec<Instance>) {
+        instances.extend(self.plants.as_flattened().iter().map(Prop::instance));
+    }
+
+    fn draw(&self, pass: &mut DrawPass<'_, '_>, instances: Range<u32>) {
+        pass.set_material(self.material());
+        for (plants, first) in self.plants.iter().zip(instances.step_by(2)) {
+            pass.set_mesh(plants[0].mesh);
+            pass.draw(first..first + 2);
+        }
+    }
+}
