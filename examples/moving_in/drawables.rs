@@ -1,4 +1,4 @@
-//! What the engine draws: the interface of all drawables, and its kinds.
+//! What the engine draws: the interface of drawables, and three kinds of them.
 
 use std::ops::Range;
 
@@ -7,30 +7,30 @@ use glam::{Mat4, Quat, Vec3, Vec4};
 
 use super::engine::{DrawPass, MAIN, MIRROR, SHADOW};
 
-/// What stands in all views.
+/// The bits of all views.
 pub const ALL_VIEWS: u32 = 1 << SHADOW | 1 << MIRROR | 1 << MAIN;
 
 pub trait Drawable: Send + Sync {
-    /// The material of all its draws, by index.
+    /// The index of its material. All its draws have one.
     fn material(&self) -> usize;
 
-    /// Its first mesh, by index.
+    /// The index of the mesh that it draws first.
     fn mesh(&self) -> usize;
 
-    /// The views that may show it: a bit each.
+    /// The bits of the views that may show it.
     fn views(&self) -> u32 {
         ALL_VIEWS
     }
 
     fn bounding_sphere(&self) -> Sphere;
 
-    /// Moves it to where it is at this time, in seconds.
+    /// Moves it to its position at `time`, in seconds.
     fn update(&mut self, _time: f32) {}
 
-    /// Appends what the shaders read of each of its instances. Their number stays the same.
+    /// Appends its instances. Their number never changes.
     fn write_instances(&self, instances: &mut Vec<Instance>);
 
-    /// Draws it. Its instances are these ones of the instance buffer.
+    /// Draws it. `instances` are its instances in the instance buffer.
     fn draw(&self, pass: &mut DrawPass<'_, '_>, instances: Range<u32>);
 }
 
@@ -40,7 +40,7 @@ pub struct Sphere {
     pub radius: f32,
 }
 
-/// As the shaders have it.
+/// What the shaders read of an instance.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct Instance {
@@ -48,7 +48,7 @@ pub struct Instance {
     tint: Vec4,
 }
 
-/// An object of one mesh, which stands still.
+/// An object with one mesh that never moves.
 #[derive(Clone, Copy)]
 pub struct Prop {
     pub mesh: usize,
@@ -81,7 +81,7 @@ impl Drawable for Prop {
     }
 
     fn bounding_sphere(&self) -> Sphere {
-        // The corners of all meshes are within a cube from -1 to 1.
+        // All meshes fit into a cube from -1 to 1.
         Sphere { center: self.position, radius: self.scale.length() }
     }
 
@@ -96,9 +96,11 @@ impl Drawable for Prop {
     }
 }
 
-/// An object that bobs up and down.
+/// An object that drifts around the world's centre, and bobs up and down.
 pub struct Floater {
     pub prop: Prop,
+    /// Its position at the beginning.
+    pub start: Vec3,
     /// In radians.
     pub phase: f32,
 }
@@ -117,6 +119,7 @@ impl Drawable for Floater {
     }
 
     fn update(&mut self, time: f32) {
+        self.prop.position = Quat::from_rotation_y(time * 0.1) * self.start;
         self.prop.position.y = 2.0 + (time + self.phase).sin();
     }
 
@@ -129,9 +132,9 @@ impl Drawable for Floater {
     }
 }
 
-/// Plants that are culled as one, and drawn with one instanced draw a mesh.
+/// Plants that are culled together. Those with the same mesh are drawn together.
 pub struct Thicket {
-    /// All have the same material.
+    /// By mesh. All have the same material.
     pub plants: [[Prop; 2]; 2],
     pub center: Vec3,
     pub radius: f32,

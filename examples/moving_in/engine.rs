@@ -1,5 +1,5 @@
 //! A small engine as people write them: boxed drawables, materials with three textures each, a shadow map and a mirror.
-//! Its code does not know how a frame culls, sorts and records: [`on_wgpu`] and [`on_drawloom`] do that.
+//! It updates and draws its drawables; [`on_wgpu`] and [`on_drawloom`] cull, sort and begin passes.
 //!
 //! [`on_wgpu`]: super::on_wgpu
 //! [`on_drawloom`]: super::on_drawloom
@@ -30,7 +30,7 @@ pub const FIELD_OF_VIEW: f32 = TAU / 6.0;
 pub const NEAR: f32 = 0.1;
 pub const TOWARDS_SUN: Vec3 = Vec3::new(0.48, 0.64, 0.6);
 
-/// What a material is drawn with: a pipeline in each view.
+/// The pipelines of a material: one for colours, one for the shadow map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shading {
     Surface,
@@ -53,18 +53,17 @@ pub struct Engine {
     instances: wgpu::Buffer,
 
     drawables: Vec<Box<dyn Drawable>>,
-    /// How many drawables move: the first ones.
+    /// The number of drawables that move. They are the first ones.
     pub moving: usize,
     // Of each drawable:
     pub spheres: Vec<Sphere>,
-    /// The views that may show it: a bit each.
+    /// The bits of the views that may show it.
     pub view_masks: Vec<u32>,
-    /// Drawables are drawn in the order of their keys, so those of a pipeline, of a material and of a mesh follow each
-    /// other.
+    /// Drawables are drawn in the order of their keys: by pipeline, then by material, then by mesh.
     pub keys: Vec<u64>,
     instance_ranges: Vec<Range<u32>>,
 
-    /// Where the main camera is.
+    /// The position of the main camera.
     pub eye: Vec3,
     /// Half of the width of the square that the shadow map covers.
     pub shadow_reach: f32,
@@ -118,7 +117,7 @@ impl Engine {
         engine
     }
 
-    /// Moves the camera and what moves to where they are at this time, in seconds, and writes what the shaders read.
+    /// Moves the camera and the drawables to their positions at `time`, in seconds, and writes the buffers.
     pub fn update(&mut self, time: f32) {
         let mut instances: Vec<Instance> = Vec::with_capacity(self.moving);
         for (drawable, sphere) in self.drawables[..self.moving].iter_mut().zip(&mut self.spheres) {
@@ -156,12 +155,12 @@ impl Engine {
         }
     }
 
-    /// Where the shadow map's camera is.
+    /// The position of the shadow map's camera.
     pub fn shadow_eye(&self) -> Vec3 {
         TOWARDS_SUN * self.shadow_reach
     }
 
-    /// Draws these drawables of a view, in this order.
+    /// Draws drawables of a view, in this order.
     pub fn draw_all<'a>(
         &'a self,
         encoder: &mut dyn RenderEncoder<'a>,
@@ -199,7 +198,7 @@ impl Engine {
     }
 }
 
-/// The pass that drawables draw into. It sets only what differs from what is set.
+/// The pass that drawables draw into. It skips what is set already.
 pub struct DrawPass<'a, 'p> {
     encoder: &'p mut dyn RenderEncoder<'a>,
     engine: &'a Engine,

@@ -11,7 +11,7 @@
 //! With `--measure` it prints the lines of code of both, and how long a frame takes on the calling thread, from the
 //! engine's arrays to submission: medians of frames that both draw in turns. In the column *moving* the camera and
 //! every eighth object move; in *at rest* nothing does. The update of what moves is not measured, as it is the same for
-//! both. By default wgpu has no device then, so only the processor's work counts.
+//! both. By default wgpu then has no device, so that only the processor's work counts.
 
 mod drawables;
 mod engine;
@@ -163,7 +163,7 @@ fn median_times(
         if moves {
             engine.update(frame as f32 * 0.02);
         }
-        // The first one finds the engine's arrays in no cache, so it is another one in each frame.
+        // The first renderer of a frame finds the engine's arrays in no cache, so they take turns.
         for turn in 0..count {
             let index = (turn + frame as usize) % count;
             let began = Instant::now();

@@ -1,8 +1,9 @@
 //! The engine's renderer on Drawloom, which culls, sorts and records on all workers, and keeps what did not change.
 //!
-//! Drawables, shaders, pipelines, bind groups and targets are the engine's, and stay as they are. Drawables draw into a
-//! [`RenderEncoder`], wgpu's interface of both passes and bundles. An engine whose drawables want a
-//! [`wgpu::RenderPass`] lends them as [`ItemRecorder::Pass`]; then no bundles are kept.
+//! Drawables, shaders, pipelines, bind groups and targets are the engine's, and stay as they are. The engine's
+//! `DrawPass` wraps a [`RenderEncoder`], which in wgpu is a pass or a bundle. An engine that wraps a
+//! [`wgpu::RenderPass`] either changes that type, or lends its drawables as [`ItemRecorder::Pass`]; then no bundles are
+//! kept.
 
 use std::error::Error;
 use std::slice;
@@ -45,7 +46,7 @@ impl OnDrawloom {
             assets: Assets::default(),
             bounds: engine.spheres.iter().map(bounding_sphere).collect(),
             layers: engine.view_masks.iter().map(|&views| LayerMask(views)).collect(),
-            // No draw call ever changes: where a drawable is, is in a buffer.
+            // A drawable that moves has the same draw calls: its position is in a buffer.
             versions: vec![0; engine.spheres.len()],
         })
     }
@@ -113,7 +114,7 @@ impl RenderProcess for ShadowMap {
     fn declare(&self, declare: &mut Declare) {
         declare.views(ViewKind::Shadow);
         declare.clears_depth(DEPTH, Format::Depth32Float);
-        // The engine's own bind groups have the map, so no process says that it samples it.
+        // Only the engine's own bind groups refer to the map, so the frame sees no process that samples it.
         declare.keep();
     }
 
@@ -135,7 +136,7 @@ impl RenderProcess for Surfaces {
         declare.also_views(ViewKind::Reflection);
         declare.clears_color(PICTURE, Format::Rgba8Srgb, ClearColor::Value(SKY));
         declare.clears_depth(DEPTH, Format::Depth32Float);
-        // As the shadow map.
+        // The mirror's bind group has the reflection.
         declare.keep();
     }
 

@@ -38,7 +38,7 @@ pub struct Target {
     pub view: wgpu::TextureView,
 }
 
-/// As the shaders have it.
+/// What the shaders read of a view.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 pub struct ViewData {

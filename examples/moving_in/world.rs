@@ -27,13 +27,13 @@ const CROSS: usize = 2;
 const STAR: usize = 3;
 const PLANE: usize = 4;
 
-// Materials, by index: stone of many hues, leaves, and the pool's last.
+// Materials, by index: first stone of many hues, then leaves, then the pool's mirror.
 const LEAF_MATERIALS: Range<usize> = 56..64;
 pub const MIRROR_MATERIAL: usize = LEAF_MATERIALS.end;
 
 /// Half of the width of the pool.
 const POOL: f32 = 9.0;
-/// Of this many places in the field, one has an object that moves.
+/// One of this many places in the field has a floater.
 const PLACES_PER_FLOATER: usize = 8;
 
 pub fn shading(material: usize) -> Shading {
@@ -46,8 +46,9 @@ pub fn shading(material: usize) -> Shading {
 
 /// Bricks of a hue, or a round leaf.
 pub fn color_texel(material: usize, x: usize, y: usize) -> [u8; 4] {
-    let hue = material as f32 / MIRROR_MATERIAL as f32 * TAU;
     let is_leaf = LEAF_MATERIALS.contains(&material);
+    // All leaves are green.
+    let hue = if is_leaf { 3.8 + (material % 8) as f32 * 0.1 } else { material as f32 / MIRROR_MATERIAL as f32 * TAU };
     let is_joint = !is_leaf && (y.is_multiple_of(8) || (x + y / 8 * 8).is_multiple_of(16));
     let shade = if is_joint { 0.5 } else { 0.9 + (hash(y * 16 + x) % 100) as f32 * 0.001 };
     let is_hole = is_leaf && x.abs_diff(8).pow(2) + y.abs_diff(8).pow(2) > 50;
@@ -55,7 +56,7 @@ pub fn color_texel(material: usize, x: usize, y: usize) -> [u8; 4] {
     [r, g, b, if is_hole { 0 } else { 255 }]
 }
 
-/// Where the normal is bent to.
+/// An offset of the normal.
 pub fn detail_texel(material: usize, x: usize, y: usize) -> [u8; 4] {
     let [across, along] = [x, y].map(|at| 128 + (hash(at * 16 + material) % 64) as u8 - 32);
     [across, along, 128, 255]
@@ -70,8 +71,8 @@ fn hash(value: usize) -> usize {
     ((mixed ^ mixed >> 13).wrapping_mul(0xC2B2_AE35) >> 8) as usize
 }
 
-/// A square field of `side` by `side` places around the pool, and the ground below. Those that move come first; their
-/// number is returned too.
+/// A square field of `side` by `side` places around the pool, and the ground below it. Also returns the number of
+/// drawables that move, which come first.
 pub fn create_drawables(side: usize) -> (Vec<Box<dyn Drawable>>, usize) {
     // Neighbours in the field are not neighbours in the list.
     let place = |index: usize| {
@@ -82,7 +83,7 @@ pub fn create_drawables(side: usize) -> (Vec<Box<dyn Drawable>>, usize) {
     let moving = side * side / PLACES_PER_FLOATER;
     let floaters = (0..moving).map(|index| {
         let prop = create_prop(index, hash(index) % LEAF_MATERIALS.start, place(index));
-        Box::new(Floater { prop, phase: index as f32 }) as Box<dyn Drawable>
+        Box::new(Floater { prop, start: prop.position, phase: index as f32 }) as Box<dyn Drawable>
     });
     let is_outside_pool = |index: &usize| place(*index).abs().max_element() > POOL + 1.0;
     let standing = (moving..side * side).filter(is_outside_pool).map(|index| {
@@ -95,10 +96,11 @@ pub fn create_drawables(side: usize) -> (Vec<Box<dyn Drawable>>, usize) {
     });
     let plane = |material, views, height, scale: f32| {
         let (position, scale) = (Vec3::Y * height, Vec3::new(scale, 1.0, scale));
-        Box::new(Prop { mesh: PLANE, material, views, position, scale, tint: Vec3::ONE }) as Box<dyn Drawable>
+        let tint = Vec3::new(0.5, 1.0, 0.8);
+        Box::new(Prop { mesh: PLANE, material, views, position, scale, tint }) as Box<dyn Drawable>
     };
+    // The ground is below the mirror, and the pool is the mirror: it shows neither.
     let ground = plane(0, ALL_VIEWS & !(1 << MIRROR), -0.3, side as f32 * 1.2);
-    // The mirror does not show itself.
     let pool = plane(MIRROR_MATERIAL, 1 << MAIN, 0.0, POOL);
     (floaters.chain(standing).chain([ground, pool]).collect(), moving)
 }
