@@ -59,7 +59,7 @@ pub struct Engine {
     pub spheres: Vec<Sphere>,
     /// The bits of the views that may show it.
     pub view_masks: Vec<u32>,
-    /// Drawables are drawn in the order of their keys: by pipeline, then by material, then by mesh.
+    /// Drawables are drawn in the order of their keys: by pipeline, then by material, then by mesh. They have 32 bits.
     pub keys: Vec<u64>,
     instance_ranges: Vec<Range<u32>>,
 
@@ -92,7 +92,7 @@ impl Engine {
         let materials = resources::create_materials(&device, &queue, &layouts, &views[MIRROR]);
         let key = |drawable: &dyn Drawable| {
             let (material, mesh) = (drawable.material(), drawable.mesh());
-            (materials[material].shading as u64) << 48 | (material as u64) << 24 | mesh as u64
+            (materials[material].shading as u64) << 28 | (material as u64) << 12 | mesh as u64
         };
         let mut engine = Self {
             meshes: world::create_meshes(&device),

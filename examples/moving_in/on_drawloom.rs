@@ -145,7 +145,8 @@ impl RenderProcess for Surfaces {
     }
 }
 
-/// Cameras that see what the engine's matrices show, in the order of its views.
+/// Cameras that see what the engine's matrices show, in the order of its views. Frames draw views in the order of their
+/// kinds, which is that of the engine too.
 fn cameras(engine: &Engine) -> [Camera; 3] {
     let reach = engine.shadow_reach;
     let sun = Camera {

@@ -7,8 +7,8 @@ use super::engine::{Engine, MAIN, MIRROR, SHADOW, SKY};
 
 #[derive(Default)]
 pub struct OnWgpu {
-    /// The drawables that a view sees, each with its key; kept for its memory.
-    visible: Vec<(u64, u32)>,
+    /// The drawables that a view sees: the key in the high half, the index in the low one. Kept for its memory.
+    visible: Vec<u64>,
 }
 
 impl OnWgpu {
@@ -19,7 +19,7 @@ impl OnWgpu {
             self.cull(engine, view);
             self.visible.sort_unstable();
             let mut pass = begin_pass(engine, &mut encoder, view);
-            engine.draw_all(&mut pass, view, self.visible.iter().map(|&(_, index)| index));
+            engine.draw_all(&mut pass, view, self.visible.iter().map(|&visible| visible as u32));
         }
         engine.queue.submit([encoder.finish()]);
     }
@@ -37,7 +37,7 @@ impl OnWgpu {
         self.visible.clear();
         for (index, sphere) in engine.spheres.iter().enumerate() {
             if engine.view_masks[index] & 1 << view != 0 && sees(sphere) {
-                self.visible.push((engine.keys[index], index as u32));
+                self.visible.push(engine.keys[index] << 32 | index as u64);
             }
         }
     }
