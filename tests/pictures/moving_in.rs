@@ -29,21 +29,16 @@ use on_wgpu::OnWgpu;
 pub const CASES: &[Case] = &[("moving_in_changes_no_byte", moving_in_changes_no_byte)];
 
 /// Workers and granularity.
-const RUNS: [(usize, Granularity); 5] = [
-    (1, Granularity::Adaptive),
-    (3, Granularity::Adaptive),
-    (2, Granularity::PerCamera),
-    (4, Granularity::Chunk(50)),
-    (2, Granularity::PerDraw),
-];
+const RUNS: [(usize, Granularity); 4] =
+    [(1, Granularity::Adaptive), (3, Granularity::Adaptive), (2, Granularity::PerCamera), (4, Granularity::Chunk(20))];
 
-/// In seconds. The world stands still in some frames.
-const TIMES: [f32; 6] = [0.0, 0.0, 0.1, 0.2, 9.0, 9.0];
+/// In seconds. The world stands still in the last frame.
+const TIMES: [f32; 4] = [0.0, 0.1, 9.0, 9.0];
 
 fn moving_in_changes_no_byte() -> Result<(), Failed> {
     let (device, queue) = device()?;
     // Each renderer draws into targets of its own, so none finds the picture of another one there.
-    let engine = || Engine::new(device.clone(), queue.clone(), 900);
+    let engine = || Engine::new(device.clone(), queue.clone(), 400);
     let (mut plain_engine, mut plain) = (engine(), OnWgpu::default());
     let mut moved = Vec::new();
     for (workers, granularity) in RUNS {
@@ -67,6 +62,6 @@ fn moving_in_changes_no_byte() -> Result<(), Failed> {
         assert!(colors.len() > 1_000, "at {time} s there are {} colours", colors.len());
         pictures.insert(expected);
     }
-    assert_eq!(pictures.len(), 4, "the world moves");
+    assert_eq!(pictures.len(), 3, "the world moves");
     Ok(())
 }
