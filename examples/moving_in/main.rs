@@ -46,7 +46,8 @@ const WARM_UP: u32 = 60;
 #[command(name = "moving_in")]
 struct Arguments {
     /// About how many drawables the engine has.
-    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    #[arg(long, value_name = "N", default_value_t = 10_000)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     objects: u32,
 
     /// Where the picture goes, a .png, .jpg, .tga or .bmp.
