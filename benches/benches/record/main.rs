@@ -51,9 +51,17 @@
 //! - *drawloom* has a process that draws items, and *without versions* it is not told that their commands are those of
 //!   the frame before, so that it records all.
 //!
+//! A fifth one has 1,000 materials with three textures each, all in view, on one thread. The textures of a kind have one
+//! size, or eight:
+//!
+//! - *a bind group a material* is by hand: objects in the order of materials and meshes, culled eight at a time; it sets
+//!   a bind group where the material changes, and draws neighbours of one mesh together.
+//! - *drawloom* has the textures in arrays, and materials in sets of arrays.
+//!
 //! The last line names the targets that were missed.
 //!
-//! `target/drawloom/record.json` and `.svg`, `record_extents.json` and `record_own_draws.json` have the same.
+//! `target/drawloom/record.json` and `.svg`, `record_extents.json`, `record_own_draws.json` and `record_textured.json`
+//! have the same.
 
 mod allocations;
 mod bundles;
@@ -74,6 +82,7 @@ mod renderer;
 mod report;
 mod spheres;
 mod technique;
+mod textured;
 mod threads;
 
 use std::error::Error;
@@ -144,6 +153,7 @@ fn run() -> Result<(), Box<dyn Error>> {
     if backends.contains(&BackendName::Noop) {
         report.extents = extents::measure(&extent, &workers, &progress)?;
         report.own_draws = own_draws::measure(&extent, &workers, &progress)?;
+        report.textured = textured::measure(&extent, &progress)?;
     }
     progress.finish_and_clear();
     report.print();

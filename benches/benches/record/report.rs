@@ -17,6 +17,7 @@ use crate::extents::{self, ExtentRow};
 use crate::measure::Measured;
 use crate::own_draws::{self, OwnRow};
 use crate::technique::BY_MESH_SCENES;
+use crate::textured::{self, TexturedRow};
 
 /// A technique on a number of workers.
 #[derive(Serialize)]
@@ -50,6 +51,7 @@ pub struct Report {
     pub measured: Vec<Measured>,
     pub extents: Vec<ExtentRow>,
     pub own_draws: Vec<OwnRow>,
+    pub textured: Vec<TexturedRow>,
 }
 
 impl Report {
@@ -62,6 +64,7 @@ impl Report {
             measured: Vec::new(),
             extents: Vec::new(),
             own_draws: Vec::new(),
+            textured: Vec::new(),
         }
     }
 
@@ -94,6 +97,9 @@ impl Report {
         }
         if !self.own_draws.is_empty() {
             own_draws::print(&self.own_draws);
+        }
+        if !self.textured.is_empty() {
+            textured::print(&self.textured);
         }
     }
 
@@ -183,6 +189,7 @@ impl Report {
             per_object(extents::MOVING_MANY) / per_object(extents::MOVING_FEW),
         );
         own_draws::add_targets(&self.own_draws, &self.workers, &mut targets);
+        textured::add_targets(&self.textured, &mut targets);
         targets
     }
 
@@ -205,6 +212,7 @@ impl Report {
         results::write_json("record.json", &self.rows().collect::<Vec<_>>())?;
         results::write_json("record_extents.json", &self.extents)?;
         results::write_json("record_own_draws.json", &self.own_draws)?;
+        results::write_json("record_textured.json", &self.textured)?;
         let panel = |&backend: &BackendName| {
             let rows = self.rows().filter(|row| row.backend == backend);
             let mut bars: Vec<_> = rows.map(bar).collect();
