@@ -145,6 +145,18 @@ pub enum BackendError {
         /// The type of number in the shader.
         expected: &'static str,
     },
+    /// A mesh [in the engine's own buffers](crate::scene::Mesh::from_buffers) does not have the
+    /// [index](crate::scene::VERTEX_INDEX) of its vertices. The process leaves its objects out, and warns with this
+    /// error.
+    #[error(
+        "process {process:?} reads the index of vertices, which mesh `{mesh}`, or one with the same layout, does not have"
+    )]
+    MissingVertexIndex {
+        /// The process.
+        process: String,
+        /// The mesh, or another one with the same layout.
+        mesh: String,
+    },
     /// A mesh [in wgpu buffers](crate::scene::Mesh), whose triangles the software backend cannot see: objects with it
     /// are left out.
     #[error("mesh `{mesh}` is in wgpu buffers, which the software backend cannot draw")]

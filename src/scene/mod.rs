@@ -86,7 +86,7 @@ pub use static_group::StaticGroup;
 pub use texture::{Texture, TextureClass, TextureFormat};
 pub use topology::Topology;
 pub(crate) use transform::is_unit;
-pub use vertex_attribute::{AttributeValue, VERTEX_COLOR, VertexAttribute};
+pub use vertex_attribute::{AttributeValue, VERTEX_COLOR, VERTEX_INDEX, VertexAttribute};
 pub use view_filter::{FilteredObjects, ViewFilter};
 pub use view_kind::ViewKind;
 pub use whole_picture::WholePicture;

@@ -63,6 +63,18 @@ const fn is_field_name(name: &str) -> bool {
 /// colours](crate::process::Deferred::vertex_colors) multiplies the diffuse colour of materials by them.
 pub const VERTEX_COLOR: VertexAttribute<[f32; 3]> = VertexAttribute::new("color");
 
+/// The index of a vertex in its mesh, which Drawloom fills in for processes that [read
+/// it](crate::process::Declare::reads_attribute): shaders find by it what an engine has for each vertex in buffers of
+/// its own, such as morph targets. It takes 4 bytes for each vertex on the device.
+///
+/// `@builtin(vertex_index)` is no such index. Meshes share buffers, so it begins where the mesh lies in them, which
+/// changes when meshes come and go. Levels of detail of [one mesh](super::Mesh::with_levels) have the vertices of the
+/// mesh; a [subdivided](super::Subdivision) mesh has vertices, and indices, of its own.
+///
+/// Meshes bring no values, but for those [in the engine's own buffers](super::Mesh::from_buffers): a process that reads
+/// the index leaves out objects whose mesh has none, and warns.
+pub const VERTEX_INDEX: VertexAttribute<u32> = VertexAttribute::new("vertex_index");
+
 // Derived implementations would require them of `T`.
 impl<T> Clone for VertexAttribute<T> {
     fn clone(&self) -> Self {

@@ -12,7 +12,8 @@ use drawloom::process::{
 };
 use drawloom::raster::{Real, Vector, Vector4};
 use drawloom::scene::{
-    Blend, Camera, Changes, Material, Mesh, RenderObject, Scene, SceneRef, Topology, Vertex, VertexAttribute,
+    Blend, Camera, Changes, Material, Mesh, RenderObject, Scene, SceneRef, Topology, VERTEX_INDEX, Vertex,
+    VertexAttribute,
 };
 use drawloom::task::Scheduler;
 use drawloom_testing::scenes::{cube, sized, square};
@@ -28,6 +29,7 @@ pub const CASES: &[Case] = &[
     ("attributes_are_those_of_their_mesh_when_meshes_come_and_go", changing_meshes),
     ("a_process_that_begins_to_read_an_attribute_reads_that_of_every_mesh", read_later),
     ("every_strategy_and_the_software_backend_read_the_same_attributes", same_everywhere),
+    ("every_vertex_has_its_index_in_its_mesh", vertex_indices),
 ];
 
 pub const COLOR: VertexAttribute<[f32; 3]> = VertexAttribute::new("colour");
@@ -248,4 +250,102 @@ fn same_everywhere() -> Result<(), Failed> {
     let differs = |(one, other): &(&[u8], &[u8])| one.iter().zip(*other).any(|(one, other)| one.abs_diff(*other) > 2);
     let differing = pairs.filter(differs).count();
     if differing * 100 > by_wgpu.bytes.len() / 4 { Err(format!("{differing} pixels differ").into()) } else { Ok(()) }
+}
+
+/// What meshes bring themselves in place of [`VERTEX_INDEX`].
+const OWN_INDEX: VertexAttribute<u32> = VertexAttribute::new("own_index");
+
+/// Draws vertices in the colour of their index into the target "coloured".
+#[derive(Clone)]
+struct Indexed {
+    attribute: VertexAttribute<u32>,
+    shader: String,
+}
+
+impl Indexed {
+    fn new(attribute: VertexAttribute<u32>, name: &str) -> Self {
+        Self {
+            attribute,
+            shader: SHADER.replace(
+                "in.colour * f32(in.strength) / 100.0 * in.shade.g",
+                &format!("vec3<f32>(f32(in.{name}) / 25.0, 0.0, 0.0)"),
+            ),
+        }
+    }
+}
+
+impl RenderProcess for Indexed {
+    fn name(&self) -> &str {
+        "indexed"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.clears_color("coloured", Format::Rgba8Unorm, ClearColor::Value([0.0, 0.0, 0.0, 1.0]));
+        declare.clears_depth("depth of coloured", Format::Depth32Float);
+        declare.reads_attribute(self.attribute, 0);
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::Commands(CommandDraws { shader: &self.shader, selection: Selection::ALL, ..CommandDraws::default() })
+    }
+
+    fn cpu_shader(&self) -> Option<CpuShader> {
+        Some(CpuShader::objects(self.clone()))
+    }
+}
+
+impl<R: Real> ObjectCpuShader<R> for Indexed {
+    fn vertex(&self, pass: &PassInputs<'_, R>, object: &ShaderObject<R>, vertex: &VertexInput<R>) -> VertexOutput<R> {
+        let mut varyings = [R::zero(); VARYINGS];
+        varyings[0] = vertex.attributes[0][0] / R::of(25.0);
+        VertexOutput { clip: pass.view.clip_position(object.relative_position(vertex.position)), varyings }
+    }
+
+    fn fragment(&self, _: &PassInputs<'_, R>, pixel: &ObjectPixel<R>, targets: &mut [Vector4<R>]) -> bool {
+        targets[0] = Vector([pixel.varyings[0], R::zero(), R::zero(), R::one()]);
+        true
+    }
+}
+
+fn vertex_indices() -> Result<(), Failed> {
+    let with_index = |mesh: Mesh| {
+        let indices: Vec<_> = (0..mesh.vertices().len() as u32).collect();
+        mesh.with_attribute(OWN_INDEX, &indices)
+    };
+    let mut fixtures = [(VERTEX_INDEX, "vertex_index"), (OWN_INDEX, "own_index")]
+        .map(|(attribute, name)| Indexed::new(attribute, name))
+        .map(|process| Fixture::with(2, |builder| builder.process(process).output("coloured")));
+    let mut scene = scene_of(vec![with_index(square(Topology::TriangleList))?, with_index(cube())?])?;
+    let material = scene.as_scene_ref().materials[0];
+    // In the last frame meshes lie elsewhere.
+    for step in 0..3 {
+        if step == 1 {
+            let mesh = scene.add(with_index(cube())?)?;
+            scene.add_object(RenderObject::new(mesh, material, DVec3::X * 4.0))?;
+        }
+        if step == 2 {
+            let removed = scene.as_scene_ref().meshes[0];
+            scene.remove(removed)?;
+        }
+        let mut pictures = Vec::new();
+        for fixture in &mut fixtures {
+            let fixture = fixture.as_mut().map_err(|error| format!("{error:?}"))?;
+            pictures.push(draw(fixture, &scene)?);
+        }
+        let reds = pictures[0].bytes.iter().step_by(4).filter(|red| **red > 0).count();
+        if pictures[0] != pictures[1] || reds < 100 {
+            return Err(format!("step {step} has other indices, or {reds} are few").into());
+        }
+        let scheduler = Arc::new(Scheduler::new(2)?);
+        let builder = Renderer::builder(SoftwareBackend::new(Arc::clone(&scheduler)));
+        let (mut renderer, submitter) =
+            builder.process(Indexed::new(VERTEX_INDEX, "vertex_index")).output("coloured").build(scheduler)?;
+        let found = submitter.submit(renderer.record(scene.as_scene_ref())?)?.submission.read(0, "coloured")?;
+        let differing =
+            found.bytes.iter().zip(&pictures[0].bytes).filter(|(one, other)| one.abs_diff(**other) > 2).count();
+        if differing * 100 > found.bytes.len() {
+            return Err(format!("step {step}: {differing} bytes differ in software").into());
+        }
+    }
+    Ok(())
 }

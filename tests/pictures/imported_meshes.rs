@@ -8,7 +8,7 @@ use drawloom::process::{ClearColor, CommandDraws, Declare, Deferred, Draws, Rend
 use drawloom::quality::{Quality, VertexFormat};
 use drawloom::scene::{
     IndexBuffer, Material, Mesh, MeshBuffers, RenderObject, Scene, SceneError, StreamAttribute, StreamLayout, Topology,
-    Vertex, VertexAttribute, VertexStream,
+    VERTEX_INDEX, Vertex, VertexAttribute, VertexStream,
 };
 use drawloom::task::Scheduler;
 use drawloom::view::{IssueReason, SceneIssue};
@@ -32,6 +32,7 @@ pub const CASES: &[Case] = &[
     ("another_layout_costs_a_pipeline_of_each_process", pipelines),
     ("buffers_that_no_mesh_can_have_are_named", invalid),
     ("objects_with_an_attribute_of_another_kind_are_left_out_and_named", another_kind),
+    ("objects_without_the_index_of_vertices_are_left_out_and_named", without_index),
     ("meshes_in_buffers_of_another_device_are_left_out_and_named", another_device),
     ("a_frame_in_flight_whose_mesh_is_destroyed_is_an_error", destroyed),
     ("a_mesh_that_exceeds_the_devices_limits_is_left_out_and_named", too_large),
@@ -434,6 +435,72 @@ fn another_kind() -> Result<(), Failed> {
     }
     let next = pictures(&mut fixture, &with_meshes(field(30), |_| with_color(Format::Unorm8x4)))?;
     if next == expected { Ok(()) } else { Err("the next frame differs".into()) }
+}
+
+/// Draws vertices in the colour of their index into the target "coloured".
+struct ReadsIndex;
+
+impl RenderProcess for ReadsIndex {
+    fn name(&self) -> &str {
+        "index"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.clears_color("coloured", drawloom::process::Format::Rgba8Unorm, ClearColor::Value([0.0; 4]));
+        declare.clears_depth("depth of coloured", drawloom::process::Format::Depth32Float);
+        declare.reads_attribute(VERTEX_INDEX, 0);
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        let shader = "
+            struct Corner {
+                @builtin(position) position: vec4<f32>,
+                @location(0) index: f32,
+            }
+
+            @vertex
+            fn vertex(in: VertexInput) -> Corner {
+                let object = drawn_object(in.instance);
+                return Corner(clip_position(relative_position(object, in.position)), f32(in.vertex_index));
+            }
+
+            @fragment
+            fn fragment(in: Corner) -> @location(0) vec4<f32> {
+                return vec4<f32>(in.index / 25.0);
+            }
+        ";
+        Draws::Commands(CommandDraws { shader, ..CommandDraws::default() })
+    }
+}
+
+fn without_index() -> Result<(), Failed> {
+    let builder = Renderer::builder(backend()?).pipeline(Deferred::to_picture()).process(ReadsIndex).output("coloured");
+    let (renderer, submitter) = builder.quality(quality()).build(Arc::new(Scheduler::new(2)?))?;
+    let mut fixture = Fixture { renderer, submitter };
+    let (device, _) = device()?;
+    let [of_pages, nothing] = [field(30), field(0)].map(|scene| pictures(&mut fixture, &scene));
+    let moved = with_meshes(field(30), |mesh| imported(&device, mesh, BufferLayout::SeparateStreams).unwrap());
+    for _ in 0..2 {
+        let issues = fixture.record(&moved)?.statistics().scene_issues.clone();
+        let is_it = |known: &SceneIssue| known.reason == IssueReason::UndrawableMesh;
+        expect(issues.len() == 1 && is_it(&issues[0]), || format!("{issues:?}"))?;
+        let found = pictures(&mut fixture, &moved)?;
+        let (of_pages, nothing) = (of_pages.as_ref().unwrap(), nothing.as_ref().unwrap());
+        expect(found[0] == of_pages[0] && found[1] == nothing[1], || "it is drawn".into())?;
+    }
+    let with_index = |mesh: &Mesh| {
+        let moved = imported(&device, mesh, BufferLayout::SeparateStreams).unwrap();
+        let mut geometry = MeshBuffers::clone(moved.buffers().unwrap());
+        let indices: Vec<_> = (0..geometry.vertex_count).collect();
+        let (contents, usage) = (bytemuck::cast_slice(&indices), BufferUsages::VERTEX);
+        let buffer = device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: None, contents, usage });
+        let attributes = vec![StreamAttribute::of(VERTEX_INDEX, Format::Uint32, 0)];
+        let layout = StreamLayout { stride: 4, attributes };
+        geometry.streams.push(VertexStream { buffer, offset: 0, layout });
+        Mesh::from_buffers("rock", moved.topology(), moved.corners(), geometry).unwrap()
+    };
+    let found = pictures(&mut fixture, &with_meshes(field(30), with_index))?;
+    expect(found == *of_pages.as_ref().unwrap(), || "it is not drawn".into())
 }
 
 fn another_device() -> Result<(), Failed> {

@@ -12,7 +12,7 @@ use crate::process::{
     VertexOutput,
 };
 use crate::raster::{NearPlane, PixelBounds, Real, Triangle, Vector, Vector4, Winding};
-use crate::scene::{Blend, Mesh, VERTEX_COLOR};
+use crate::scene::{Blend, Mesh, VERTEX_COLOR, VERTEX_INDEX};
 
 /// A range of one object's triangles.
 pub(super) struct TriangleRange {
@@ -227,8 +227,9 @@ fn vertex_input<R: Real>(mesh: &Mesh, index: usize, attributes: &[DeclaredAttrib
     let real = |value: f32| R::of(f64::from(value));
     let vertex = mesh.vertices()[index];
     let value_of = |&DeclaredAttribute { layout, ref default }: &DeclaredAttribute| {
-        let stride = layout.format.bytes();
-        let value = mesh.attribute_of(layout).map_or(default.as_slice(), |values| &values[index * stride..][..stride]);
+        let (stride, number) = (layout.format.bytes(), (index as u32).to_ne_bytes());
+        let default = if layout == VERTEX_INDEX.layout() { &number } else { default.as_slice() };
+        let value = mesh.attribute_of(layout).map_or(default, |values| &values[index * stride..][..stride]);
         Vector(layout.format.numbers(value).map(R::of))
     };
     let is_color = |attribute: &DeclaredAttribute| attribute.layout == VERTEX_COLOR.layout();

@@ -133,7 +133,9 @@ impl ProcessPipelines {
         let mut created = HashMap::new();
         for variant in missing {
             match self.create(device, label, &variant) {
-                Err(problem @ BackendError::AttributeFormatMismatch { .. }) => {
+                Err(
+                    problem @ (BackendError::AttributeFormatMismatch { .. } | BackendError::MissingVertexIndex { .. }),
+                ) => {
                     self.unreadable.write().insert(variant);
                     emit_unlocked(move || {
                         tracing::warn!(target: "drawloom", %problem, "objects with this mesh are left out by this process");

@@ -6,7 +6,7 @@ use crate::backend::wgpu::resources::{
     VertexSlot, VertexStreamLayouts, vertex_attributes, vertex_format, vertex_stride,
 };
 use crate::process::{DeclaredAttribute, FIRST_OWN_LOCATION};
-use crate::scene::{AttributeFormat, NORMAL, NumberKind, POSITION, StreamAttribute, UV};
+use crate::scene::{AttributeFormat, NORMAL, NumberKind, POSITION, StreamAttribute, UV, VERTEX_INDEX};
 
 /// The vertex buffers of a pipeline, each with its attributes, in the order of their slots.
 #[derive(PartialEq, Eq, Hash)]
@@ -47,12 +47,18 @@ impl VertexBuffers {
     /// Those of meshes with this layout.
     ///
     /// # Errors
-    /// If an attribute is not of the kind of number that the process's shader reads.
+    /// If an attribute is not of the kind of number that the process's shader reads, or the shader reads the index of
+    /// vertices, and no stream has it.
     pub(super) fn of_imported_meshes(
         layout: &VertexStreamLayouts,
         own: &[DeclaredAttribute],
         process: &str,
     ) -> Result<Self, BackendError> {
+        let index = VERTEX_INDEX.layout();
+        if own.iter().any(|attribute| attribute.layout == index) && layout.lacks(index.name) {
+            let (process, mesh) = (process.to_owned(), layout.mesh.clone());
+            return Err(BackendError::MissingVertexIndex { process, mesh });
+        }
         let shipped = [POSITION, NORMAL, UV].into_iter().map(|name| (name, AttributeFormat::Float32(4)));
         let names = shipped.chain(own.iter().map(|attribute| (attribute.layout.name, attribute.layout.format)));
         let locations: Vec<_> = (0..).zip(names).collect();

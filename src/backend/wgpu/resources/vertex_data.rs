@@ -4,7 +4,7 @@ use super::buffers::{CountedQueue, filled_buffer, new_buffer};
 use crate::backend::BackendError;
 use crate::process::DeclaredAttribute;
 use crate::quality::VertexFormat;
-use crate::scene::{AttributeFormat, AttributeLayout, Mesh, PackedVertex, Vertex};
+use crate::scene::{AttributeFormat, AttributeLayout, Mesh, PackedVertex, VERTEX_INDEX, Vertex};
 
 /// Bytes per vertex.
 pub(crate) fn vertex_stride(format: VertexFormat) -> u64 {
@@ -110,6 +110,10 @@ impl AttributeSet {
 fn with_values<T>(mesh: &Mesh, attribute: &DeclaredAttribute, visit: impl FnOnce(&[u8]) -> T) -> T {
     match mesh.attribute_of(attribute.layout) {
         Some(values) => visit(values),
+        None if attribute.layout == VERTEX_INDEX.layout() => {
+            let indices: Vec<_> = (0..mesh.vertices().len() as u32).collect();
+            visit(bytemuck::cast_slice(&indices))
+        }
         None => visit(&attribute.default.repeat(mesh.vertices().len())),
     }
 }
