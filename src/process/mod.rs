@@ -58,7 +58,7 @@ use declaration::source_of_previous;
 pub use declaration::{Declare, previous_name};
 pub use deferred::{
     COLORED_SURFACE_SHADER, Deferred, Deformation, DepthPrePass, GeometryBuffer, GeometryFormats, ILLUMINATION_SHADER,
-    LightVolumes, SURFACE_SHADER, ShadowCasters, Transparency, lighting_shader, targets,
+    LightTiles, LightVolumes, SURFACE_SHADER, ShadowCasters, Transparency, lighting_shader, targets,
 };
 pub use draws::{CommandDraws, Draws, FullScreen, LightDraws, MaskedEntryPoints};
 pub use face_culling::FaceCulling;

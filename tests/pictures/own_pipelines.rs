@@ -6,8 +6,8 @@ mod forward;
 use drawloom::command::Selection;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{
-    ClearColor, CommandDraws, Declare, Deferred, Draws, Format, FullScreen, InjectionPoint, RenderProcess, ToneMapping,
-    lighting_shader, targets,
+    ClearColor, CommandDraws, Declare, Deferred, Draws, Format, FullScreen, InjectionPoint, LightTiles, RenderProcess,
+    ToneMapping, lighting_shader, targets,
 };
 use drawloom::scene::{Blend, Camera, Light, Material, MaterialType, RenderObject, Scene, ViewKind};
 use drawloom::view::ShadowMaps;
@@ -79,10 +79,11 @@ const CLAY: MaterialType<[f32; 4]> = MaterialType::new("clay");
 
 struct Clay {
     shader: String,
+    has_tiles: bool,
 }
 
 impl Clay {
-    fn new(maps: &ShadowMaps) -> Self {
+    fn new(maps: &ShadowMaps, has_tiles: bool) -> Self {
         let own = "
             @group(3) @binding(0) var<storage, read> clays: array<vec4<f32>>;
 
@@ -102,11 +103,18 @@ impl Clay {
 
             @fragment
             fn fragment(in: Corner) -> @location(0) vec4<f32> {
-                let illuminance = view.ambient * PI + illuminance_at(in.relative, normalize(in.normal));
+                let illuminance = view.ambient * PI + ILLUMINANCE;
                 return vec4<f32>(clays[in.material].rgb / PI * illuminance, 1.0);
             }
         ";
-        Self { shader: [&lighting_shader(Some((1, maps))), own].concat() }
+        let (lighting, illuminance) = match has_tiles {
+            false => (lighting_shader(Some((1, maps))), "illuminance_at(in.relative, normalize(in.normal))"),
+            true => (
+                LightTiles::lighting_shader(1, Some((2, maps))),
+                "illuminance_in_tile(vec2<u32>(in.clip.xy), in.relative, normalize(in.normal))",
+            ),
+        };
+        Self { shader: [lighting, own.replace("ILLUMINANCE", illuminance)].concat(), has_tiles }
     }
 }
 
@@ -117,6 +125,9 @@ impl RenderProcess for Clay {
 
     fn declare(&self, declare: &mut Declare) {
         declare.at(InjectionPoint::AfterLighting);
+        if self.has_tiles {
+            declare.samples(LightTiles::TARGET);
+        }
         declare.samples_layers(ViewKind::Shadow, targets::SHADOW_MAP);
         declare.draws_over(targets::RADIANCE);
         declare.draws_depth(targets::DEPTH);
@@ -146,6 +157,13 @@ fn lit_surfaces() -> Result<(), Failed> {
     // One of each kind, all of them, and none.
     let mut scenes: Vec<Vec<Light>> = lights.iter().map(|light| vec![light.clone()]).collect();
     scenes.extend([lights.to_vec(), Vec::new()]);
+    // Small ones too, each of which reaches some tiles.
+    let small = |index: i32| {
+        let position = DVec3::new(f64::from(index % 20) * 0.4 - 4.0, -0.8, f64::from(index / 20) * 0.8 - 4.0);
+        let intensity = Vec3::new(0.1, 0.02 * (index % 5) as f32, 0.02);
+        Light::Point { position, intensity, range: 0.7, casts_shadow: false }
+    };
+    scenes.push(lights.iter().cloned().chain((0..200).map(small)).collect());
     for lights in scenes {
         let mut scene = boxes(0)?;
         let floor = scene.add(Material { diffuse: Vec3::splat(0.6), ..Material::default() })?;
@@ -164,11 +182,18 @@ fn lit_surfaces() -> Result<(), Failed> {
             let values = Some(CLAY.values(material.diffuse.extend(1.0).to_array()));
             scene.replace(handle, Material { blend: Blend::None, values, ..material })?;
         }
-        let mut own = Fixture::with(2, |builder| builder.pipeline(deferred()).process(Clay::new(&maps)))?;
-        let found = as_image(&own.draw(&scene)?)?;
-        let distance = Distance::between(&found, &expected)?;
+        let clay = |has_tiles| Clay::new(&maps, has_tiles);
+        let mut own = Fixture::with(2, |builder| builder.pipeline(deferred()).process(clay(false)))?;
+        let found = own.draw(&scene)?;
+        let distance = Distance::between(&as_image(&found)?, &expected)?;
         if !distance.is_within_bound() {
             return Err(format!("{lights:?}: {distance:?}").into());
+        }
+        // A tile leaves out lights that add nothing.
+        let mut tiled =
+            Fixture::with(2, |builder| builder.pipeline(deferred()).process(LightTiles).process(clay(true)))?;
+        if tiled.draw(&scene)? != found {
+            return Err(format!("{lights:?} in tiles").into());
         }
     }
     Ok(())

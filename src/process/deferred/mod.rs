@@ -25,7 +25,7 @@ pub use geometry_buffer::GeometryBuffer;
 pub use geometry_formats::GeometryFormats;
 use light_classes::LightClasses;
 use light_sum::LightSum;
-use light_tiles::LightTiles;
+pub use light_tiles::LightTiles;
 pub use light_volumes::LightVolumes;
 pub use pipeline::Deferred;
 pub use shading::{COLORED_SURFACE_SHADER, ILLUMINATION_SHADER, SURFACE_SHADER, lighting_shader};

@@ -35,7 +35,9 @@ pub const ILLUMINATION_SHADER: &str = include_str!("illumination.wgsl");
 /// pass. It follows [`SHADER_PRELUDE`](crate::process::SHADER_PRELUDE), and begins with [`ILLUMINATION_SHADER`].
 ///
 /// - `illuminance_at(position, normal)` is the illuminance of a surface by all lights that reach the view, with their
-///   shadows. The ambient light's is `view.ambient * PI`.
+///   shadows. The ambient light's is `view.ambient * PI`. Where there are many lights,
+///   [`LightTiles`](crate::process::LightTiles) has a loop over those that reach a tile of the picture.
+/// - `visible_illuminance_from(light, position, normal)` is that of one of the `lights`, for loops of an engine's own.
 /// - `light_visibility(light, position, normal)` is the fraction of one of the `lights` that reaches a position, from 0
 ///   to 1, by the filter and the bias of the maps. It needs no uniform control flow.
 ///
