@@ -4,7 +4,7 @@ struct Character {
 }
 
 @group(3) @binding(0) var<storage, read> characters: array<Character>;
-@group(3) @binding(1) var<storage, read> joints: array<mat4x4<f32>>;
+@group(3) @binding(FIRST_RESOURCE) var<storage, read> joints: array<mat4x4<f32>>;
 
 // The morph target, then both joints.
 fn deform(in: VertexInput, object: Object) -> VertexInput {

@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 /// Something of the engine's own that a process's shader reads, at `@group(3)`: after the
 /// [columns](super::Declare::reads_column) and [materials](super::Declare::reads_materials) that the process reads,
-/// each has the next binding.
+/// each has the next binding. The first of them is `FIRST_RESOURCE` in WGSL, so that text which several processes have
+/// finds its resources in all of them: `@group(3) @binding(FIRST_RESOURCE + 1)`.
 ///
 /// Handles are of the renderer's device. wgpu recognises those of another device, unless it belongs to another
 /// `wgpu::Instance`.

@@ -6,13 +6,13 @@ use drawloom::Renderer;
 use drawloom::backend::{Picture, SoftwareBackend};
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{
-    CpuShader, Declare, Deferred, Deformation, DeformationCpuShader, GeometryBuffer, GeometryFormats, PassInputs,
-    ShaderObject, ShaderResource, VertexInput,
+    CpuShader, Declare, Deferred, Deformation, DeformationCpuShader, Draws, GeometryBuffer, GeometryFormats,
+    PassInputs, RenderProcess, ShaderObject, ShaderResource, VertexInput,
 };
 use drawloom::raster::{Real, Vector};
 use drawloom::scene::{
-    Blend, Bounds, Camera, LayerMask, Light, Material, Mesh, ObjectColumn, RenderObject, Scene, SceneRef, Topology,
-    VERTEX_COLOR, Vertex, VertexAttribute,
+    Blend, Bounds, Camera, LayerMask, Light, Material, MaterialType, Mesh, ObjectColumn, RenderObject, Scene, SceneRef,
+    Topology, VERTEX_COLOR, Vertex, VertexAttribute,
 };
 use drawloom::task::Scheduler;
 use drawloom_testing::scenes::{cube, sized};
@@ -70,7 +70,7 @@ impl Deformation for Push {
     fn shader(&self) -> &str {
         "
             @group(3) @binding(0) var<storage, read> push: array<f32>;
-            @group(3) @binding(1) var<storage, read> aside: array<f32>;
+            @group(3) @binding(FIRST_RESOURCE) var<storage, read> aside: array<f32>;
 
             fn deform(in: VertexInput, object: Object) -> VertexInput {
                 var out = in;
@@ -162,6 +162,24 @@ fn with_top(mesh: &Mesh, push: f32) -> Result<Mesh, Failed> {
     Ok(moved.with_triangle_culling(push == 0.0))
 }
 
+/// A process whose resources have other bindings than those of the others.
+struct ReadsMaterials(GeometryBuffer);
+
+impl RenderProcess for ReadsMaterials {
+    fn name(&self) -> &str {
+        self.0.name()
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        self.0.declare(declare);
+        declare.reads_materials(MaterialType::<u32>::new("unread"));
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        self.0.draws()
+    }
+}
+
 fn pushes() -> Vec<f32> {
     PUSHES.into_iter().chain([100.0, 100.0]).collect()
 }
@@ -187,6 +205,8 @@ fn shape() -> Result<(), Failed> {
         Deferred::to_picture().vertex_colors(true),
         Deferred::to_picture().shadow_maps(None),
         Deferred::to_picture().replace("geometry buffer", GeometryBuffer::new(GeometryFormats::default())),
+        Deferred::to_picture()
+            .replace("geometry buffer", ReadsMaterials(GeometryBuffer::new(GeometryFormats::default()))),
     ] {
         let expected = picture_of(pipeline.clone(), &moved, &layers, &pushes())?;
         if expected == picture_of(pipeline.clone(), &scene, &layers, &pushes())? {

@@ -66,7 +66,8 @@ pub trait Deformation: Send + Sync {
     /// WGSL with the function `deform`: see [`CommandDraws::deformation`].
     fn shader(&self) -> &str;
 
-    /// The engine's own resources that its shader reads, such as palettes of joints, at `@group(3)` behind the columns.
+    /// The engine's own resources that its shader reads, such as palettes of joints, at `@group(3)`: the first has the
+    /// binding `FIRST_RESOURCE` in each process, the others follow.
     fn resources(&self) -> Vec<ShaderResource<'_>> {
         Vec::new()
     }

@@ -5,9 +5,10 @@
 //   @group(2)  the process's own: binding 0 its parameters, bindings 1, 2 ... the targets that it samples, in order,
 //              then the buffers that it reads or changes
 //   @group(3)  the engine's own, from binding 0: the columns of objects that the process reads, the values of
-//              materials, then its resources
+//              materials, then its resources: from binding FIRST_RESOURCE
 //
-// `const ABSOLUTE_TRANSFORMS: bool` goes before it, as the frame's quality says.
+// `const ABSOLUTE_TRANSFORMS: bool` goes before it, as the frame's quality says, and so does
+// `const FIRST_RESOURCE: u32`, as the process declares.
 
 struct View {
     // No shader reads it. Lavapipe of Mesa 22.3 inlines the first four bytes of a uniform buffer into shaders that read

@@ -34,7 +34,8 @@ impl CompiledShader {
     ) -> Result<Self, BackendError> {
         let PipelineInputs { name, key, attributes, .. } = inputs;
         let clamps_corners = !(inputs.has_clamped_pipelines() && inputs.clamps_pixels());
-        let before = key.prelude(attributes.iter().map(|attribute| attribute.layout), clamps_corners);
+        let attributes = attributes.iter().map(|attribute| attribute.layout);
+        let before = key.prelude(attributes, inputs.array_count, clamps_corners);
         let shaders = key.own_shaders();
         let compile = |complete: &str| compile_shader(device, name, complete, &before, &shaders);
         let module = shared.module(complete_text(&before, &shaders), compile)?;

@@ -119,11 +119,20 @@ impl<'a> PipelineKey<'a> {
         }
     }
 
-    /// What goes before the process's own WGSL, which reads these attributes and may [clamp corners](prelude_with).
-    pub(crate) fn prelude(&self, attributes: impl Iterator<Item = AttributeLayout>, clamps_corners: bool) -> String {
+    /// What goes before the process's own WGSL, which reads these attributes, has its resources from a binding on, and
+    /// may [clamp corners](prelude_with).
+    pub(crate) fn prelude(
+        &self,
+        attributes: impl Iterator<Item = AttributeLayout>,
+        first_resource: usize,
+        clamps_corners: bool,
+    ) -> String {
         let is_absolute = self.transforms == TransformPrecision::Absolute;
         let prelude = prelude_with(&attributes.collect::<Vec<_>>(), self.deformation.is_some(), clamps_corners);
-        format!("const ABSOLUTE_TRANSFORMS: bool = {is_absolute};\n{prelude}\n")
+        let constants = format!(
+            "const ABSOLUTE_TRANSFORMS: bool = {is_absolute};\nconst FIRST_RESOURCE: u32 = {first_resource}u;\n"
+        );
+        constants + &prelude + "\n"
     }
 
     /// The process's own texts of WGSL, each with what it is.
