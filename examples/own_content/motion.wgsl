@@ -4,7 +4,7 @@ struct PreviousCamera {
 }
 
 @group(2) @binding(0) var<uniform> previous: PreviousCamera;
-@group(3) @binding(0) var<storage, read> displacements: array<vec4<f32>>;
+@group(3) @binding(0) var<storage, read> previous_objects: array<Object>;
 
 struct Corner {
     @invariant @builtin(position) position: vec4<f32>,
@@ -16,7 +16,8 @@ struct Corner {
 fn vertex(in: VertexInput) -> Corner {
     let object = drawn_object(in.instance);
     let relative = relative_position(object, in.position);
-    let relative_then = relative + previous.camera_moved.xyz - displacements[object.index].xyz;
+    // From this frame's camera to where the corner was, then from the camera of the frame before.
+    let relative_then = relative_position(previous_objects[object.index], in.position) + previous.camera_moved.xyz;
     let now = clip_position(relative);
     let then = previous.clip_from_relative * vec4<f32>(relative_then, 1.0);
     return Corner(now, now.xyw, then.xyw);

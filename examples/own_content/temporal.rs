@@ -1,19 +1,16 @@
-//! Temporal anti-aliasing: motion vectors from the displacement of each object, and the filtered picture of the frame
-//! before.
+//! Temporal anti-aliasing: motion vectors from where each object was in the frame before, and the filtered picture of
+//! that frame.
 
 use drawloom::command::Selection;
 use drawloom::glam::Mat4;
 use drawloom::process::{
     ClearColor, CommandDraws, Declare, Draws, Format, FullScreen, InjectionPoint, RenderProcess, Target, targets,
 };
-use drawloom::scene::{Camera, ObjectColumn};
+use drawloom::scene::{Camera, PREVIOUS_OBJECTS};
 use drawloom::view::RenderView;
 use parking_lot::Mutex;
 
 use crate::metal;
-
-/// How far each object has moved since the last frame, in metres, and 0.
-pub const DISPLACEMENT: ObjectColumn<[f32; 4]> = ObjectColumn::new("displacement");
 
 const MOTION: Target = Target::new("motion");
 
@@ -61,7 +58,7 @@ impl RenderProcess for Motion {
         declare.after(metal::NAME);
         declare.clears_color(MOTION, Format::Rg16Float, ClearColor::Value([0.0; 4]));
         declare.matches_depth(targets::DEPTH);
-        declare.reads_column(DISPLACEMENT);
+        declare.reads_column(PREVIOUS_OBJECTS);
     }
 
     fn draws(&self) -> Draws<'_> {

@@ -7,7 +7,6 @@ use drawloom::scene::{
 };
 
 use crate::metal::{self, METAL, Metal};
-use crate::temporal::DISPLACEMENT;
 use crate::tints::TINT;
 
 /// The positions of the rings in metres, and how far each is turned towards the camera.
@@ -35,8 +34,6 @@ pub struct World {
     field: usize,
     /// Red, green, blue, and how much of it is emitted.
     tints: Vec<[f32; 4]>,
-    /// How far each object has moved since the last frame, in metres, and 0.
-    displacements: Vec<[f32; 4]>,
 }
 
 impl World {
@@ -82,7 +79,6 @@ impl World {
             materials: vec![white; count],
             field,
             tints: (0..count).map(tint).collect(),
-            displacements: vec![[0.0; 4]; count],
         };
         for ((object, (position, turn)), metal) in (field..).zip(RINGS).zip(metals) {
             world.positions[object] = position.into();
@@ -93,7 +89,6 @@ impl World {
             world.materials[object] = metal?;
         }
         world.place();
-        world.displacements.fill([0.0; 4]);
         Ok(world)
     }
 
@@ -106,19 +101,16 @@ impl World {
 
     fn place(&mut self) {
         let side = (self.field as f64).sqrt().ceil();
-        let objects = self.positions[..self.field].iter_mut().zip(&mut self.displacements).enumerate();
-        for (index, (position, displacement)) in objects {
+        for (index, position) in self.positions[..self.field].iter_mut().enumerate() {
             let (x, z) = (index as f64 % side - side / 2.0, (index as f64 / side).floor() - side / 2.0);
             let height = (x * 0.15 + self.time * 2.0).sin() + (z * 0.2).cos();
-            let moved = DVec3::new(x * 0.7, height, z * 0.7);
-            *displacement = (moved - *position).as_vec3().extend(0.0).to_array();
-            *position = moved;
+            *position = DVec3::new(x * 0.7, height, z * 0.7);
         }
     }
 
     /// The engine's own data of objects.
-    pub fn columns(&self) -> [ColumnValues<'_>; 2] {
-        [TINT.values(&self.tints), DISPLACEMENT.values(&self.displacements)]
+    pub fn columns(&self) -> [ColumnValues<'_>; 1] {
+        [TINT.values(&self.tints)]
     }
 
     pub fn as_scene_ref<'a>(&'a self, columns: &'a [ColumnValues<'a>]) -> SceneRef<'a> {

@@ -173,7 +173,8 @@ impl Declare {
     /// next 1, and so on. Each is an array with an element for each object of the scene, by `Object.index`. It may be
     /// longer than that.
     ///
-    /// Frames whose scene has no such column fail. A device with the least number of storage buffers a shader,
+    /// Frames whose scene has no such column fail; [`PREVIOUS_OBJECTS`](crate::scene::PREVIOUS_OBJECTS) is one that
+    /// Drawloom has. A device with the least number of storage buffers a shader,
     /// [`WgpuBackend::REQUIRED_LIMITS`](crate::backend::WgpuBackend::REQUIRED_LIMITS), has none left for columns:
     /// request `max_storage_buffers_per_shader_stage` of 4 and one for each column.
     ///

@@ -75,7 +75,7 @@ pub use mesh_buffers::{IndexBuffer, MeshBuffers, StreamAttribute, StreamLayout, 
 pub(crate) use mesh_buffers::{NORMAL, NumberKind, POSITION, UV};
 pub(crate) use node_column::Column;
 pub use node_column::{ChunkInUse, ColumnChunk, NodeColumn, WrittenColumn, WrittenColumns};
-pub use object_column::{ColumnValues, ObjectColumn};
+pub use object_column::{ColumnValues, ObjectColumn, PREVIOUS_OBJECTS};
 pub use object_set::ObjectSet;
 pub use owned_scene::{ObjectHandle, RenderObject, Scene};
 pub use projection::Projection;

@@ -4,9 +4,8 @@ use std::marker::PhantomData;
 
 use bytemuck::Pod;
 
-/// A name for data that an engine has for each object, such as a tint, the offset of a skinning palette, or the
-/// transform of the frame before. Make it once, as a constant: scenes bring values for it, and processes declare that
-/// their shaders read them.
+/// A name for data that an engine has for each object, such as a tint or the offset of a skinning palette. Make it once,
+/// as a constant: scenes bring values for it, and processes declare that their shaders read them.
 ///
 /// `T` has the layout of an element of the array in WGSL, padding included: `array<vec3<f32>>` has 16 bytes an element.
 ///
@@ -56,6 +55,29 @@ impl<T: Pod> ObjectColumn<T> {
         ColumnValues { layout: self.layout(), bytes: bytemuck::cast_slice(values) }
     }
 }
+
+/// The objects as they were in the frame before, which Drawloom keeps for processes that [read
+/// them](crate::process::Declare::reads_column): for motion vectors, which temporal filters and upscalers need. Scenes
+/// bring no values.
+///
+/// ```wgsl
+/// @group(3) @binding(0) var<storage, read> previous_objects: array<Object>;
+///
+/// fn previous_relative_position(object: Object, position: vec3<f32>) -> vec3<f32> {
+///     return relative_position(previous_objects[object.index], position);
+/// }
+/// ```
+///
+/// That is where a corner was, relative to this frame's camera; the process knows how the camera moved. The example
+/// `own_content` has such a process.
+///
+/// The frame before is the one that was submitted last. An object is known by its index: one that the frame before did
+/// not have is where it was, and one that moves to another index seems to have been where the object was that had it.
+/// A [deformed](crate::process::Deformation) object's shape is the engine's.
+///
+/// The price is a copy of all objects on the device, 64 bytes each, at the end of each frame in which one changes. The
+/// software backend has no such column, and returns an error.
+pub const PREVIOUS_OBJECTS: ObjectColumn<[u32; 16]> = ObjectColumn::new("previous objects");
 
 // Derived implementations would require them of `T`.
 impl<T> Clone for ObjectColumn<T> {

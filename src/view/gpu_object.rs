@@ -1,5 +1,7 @@
 //! The GPU layout of an object.
 
+use crate::scene::PREVIOUS_OBJECTS;
+
 /// The GPU layout of an object: `Object` in `drawloom.wgsl`. The position is in fixed point, so its difference from any
 /// view's camera is exact, and one table serves all views.
 #[repr(C)]
@@ -20,3 +22,6 @@ pub struct GpuObject {
     /// The object's index in the scene.
     pub object: u32,
 }
+
+// The column has them as they are.
+const _: () = assert!(PREVIOUS_OBJECTS.layout().stride == size_of::<GpuObject>());

@@ -53,6 +53,7 @@ mod placement;
 mod post;
 mod precision;
 mod prepared_pipelines;
+mod previous_objects;
 mod processes;
 mod random_scenes;
 mod rays;
@@ -122,6 +123,7 @@ fn main() {
         (lighting::CASES, Needs::Adapter),
         (changing_shaders::CASES, Needs::Adapter),
         (columns::CASES, Needs::Adapter),
+        (previous_objects::CASES, Needs::Adapter),
         (compute::CASES, Needs::Adapter),
         (cpu_nodes::CASES, Needs::Adapter),
         (cube_shadows::CASES, Needs::Adapter),

@@ -20,6 +20,7 @@ use crate::backend::mip_schedule::MipSchedule;
 use crate::backend::{BackendError, FrameRequest};
 use crate::process::{Access, ClearColor, CpuShader, Draws, Pass, PipelineState, PlannedProcess, TypedCpuShader};
 use crate::quality::VertexFormat;
+use crate::scene::PREVIOUS_OBJECTS;
 use crate::task::catch;
 
 /// Draws frames in one precision, and keeps meshes, materials and targets over frames.
@@ -153,6 +154,11 @@ fn software_pass<R: Precision>(
     if request.draws[pass.process_index].pipeline_state().is_some_and(|state| *state != PipelineState::default()) {
         let message =
             String::from("the software backend has no depth bias, and no depth comparisons or masks of its own");
+        return Err(BackendError::Validation { label: process, message });
+    }
+    let declaration = &request.plan.processes()[pass.process_index].declaration;
+    if declaration.columns.contains(&PREVIOUS_OBJECTS.layout()) {
+        let message = String::from("the software backend does not keep the objects of the frame before");
         return Err(BackendError::Validation { label: process, message });
     }
     if request.plan.attachment_extent(pass.process_index).multisampled {

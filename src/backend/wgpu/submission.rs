@@ -28,7 +28,9 @@ impl WgpuBackend {
         let has_histories = frame.targets.have_histories();
         let drawn: HashSet<_> = queues.iter().filter(|_| has_histories).map(|queue| queue.view).collect();
         let pass_count = queues.iter().map(|queue| queue.passes.len()).sum();
-        let mut finished = Vec::with_capacity(pass_count);
+        let [before, behind] = frame.buffers.copies_of_objects(&self.device)?;
+        let mut finished = Vec::with_capacity(pass_count + 1);
+        finished.extend(before);
         let (inner_fences, end_fences): (Vec<_>, Vec<_>) =
             fences.into_iter().partition(|fence| fence.passes < pass_count);
         let mut inner_fences = inner_fences.into_iter().peekable();
@@ -73,7 +75,7 @@ impl WgpuBackend {
             let copies = copies.transpose()?;
             let mut finished = finished.into_iter();
             self.submit_up_to_fences(&mut finished, inner_places)?;
-            let index = self.queue().submit(finished.chain(copies).chain(copy));
+            let index = self.queue().submit(finished.chain(copies).chain(behind).chain(copy));
             frame.buffers.objects().await_submission(self.queue());
             let (device, queue) = (self.device.clone(), self.queue().clone());
             Ok((WgpuSubmission::new(device, queue, index.clone(), Arc::clone(&frame.targets), readback), index))

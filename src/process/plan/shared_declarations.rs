@@ -3,7 +3,7 @@
 use super::{PlanError, PlannedProcess};
 use crate::command::MaterialTypes;
 use crate::process::{BufferAccess, BufferLayout, Declaration, DeclaredAttribute, Draws};
-use crate::scene::{ColumnLayout, MaterialLayout, SceneRef};
+use crate::scene::{ColumnLayout, MaterialLayout, PREVIOUS_OBJECTS, SceneRef};
 
 /// What a plan's processes declare, each name once, in the order in which it is first declared.
 pub(super) struct SharedDeclarations {
@@ -113,7 +113,8 @@ impl SharedByName for (BufferLayout, BufferAccess) {
     }
 }
 
-/// Checks that a scene has the columns that the processes read, and those by which they order what they draw.
+/// Checks that a scene has the columns that the processes read, and those by which they order what they draw, but for
+/// the one that backends have.
 ///
 /// # Errors
 /// If it lacks one, or its elements have another size.
@@ -125,7 +126,7 @@ pub(super) fn check_columns(
     let read =
         processes.iter().flat_map(|planned| planned.declaration.columns.iter().map(move |&column| (planned, column)));
     let orders = processes.iter().zip(draws).filter_map(|(planned, draws)| Some((planned, draws.order_column()?)));
-    for (planned, declared) in read.chain(orders) {
+    for (planned, declared) in read.chain(orders).filter(|(_, column)| *column != PREVIOUS_OBJECTS.layout()) {
         let (process, column) = (|| planned.name.clone(), declared.name);
         match scene.columns.iter().find(|values| values.name() == column) {
             None => return Err(PlanError::MissingColumn { process: process(), column }),

@@ -11,6 +11,7 @@ use super::allotment::allot;
 use super::material_buffer::MaterialBuffer;
 use super::object_buffers::{ObjectBuffers, ObjectLists};
 use super::pass_state::{FrameRanges, PassId, WgpuPassState};
+use super::previous_objects::{Contents, PreviousObjects};
 use super::resource_bytes::ResourceBytes;
 use crate::backend::subdivision_cache::SubdividedMeshes;
 use crate::backend::wgpu::error_scope::poll;
@@ -22,6 +23,7 @@ use crate::backend::wgpu::timing::Timestamps;
 use crate::backend::{BackendError, FrameRequest};
 use crate::command::{DrawList, Version};
 use crate::process::{Draws, Pass, PlannedProcess, ShaderResource};
+use crate::scene::PREVIOUS_OBJECTS;
 use crate::view::{GpuView, PerView};
 
 /// A pool of frame buffers.
@@ -30,6 +32,7 @@ use crate::view::{GpuView, PerView};
 /// at once, because wgpu orders these after earlier submissions. It may map them when the device is done with them.
 pub(crate) struct BufferPool {
     free: Mutex<FreeBuffers>,
+    previous_objects: Mutex<PreviousObjects>,
     /// Whether objects are written into mapped memory.
     maps_memory: bool,
 }
@@ -52,12 +55,12 @@ impl BufferPool {
 
     /// An empty pool. `maps_memory`: whether objects are written into mapped memory.
     pub(crate) fn new(maps_memory: bool) -> Self {
-        Self { free: Mutex::default(), maps_memory }
+        Self { free: Mutex::default(), previous_objects: Mutex::new(PreviousObjects::new()), maps_memory }
     }
 
     /// The sizes of all pooled buffers in bytes; 0 for one that the device does not have yet.
     pub(crate) fn sizes(&self) -> Vec<u64> {
-        let mut sizes = Vec::new();
+        let mut sizes = vec![self.previous_objects.lock().size()];
         for buffers in &self.free.lock().buffers {
             sizes.extend(buffers.all().map(GrowingBuffer::size));
             sizes.extend(buffers.objects.sizes());
@@ -75,6 +78,7 @@ impl BufferPool {
         let mut free = self.free.lock();
         free.buffers.clear();
         free.generation += 1;
+        *self.previous_objects.lock() = PreviousObjects::new();
     }
 
     /// Takes buffers for a frame, with mapped memory for its objects if the device is done with free buffers.
@@ -89,7 +93,7 @@ impl BufferPool {
         let (mut buffers, generation) = self.take_free();
         buffers.objects.map(device)?;
         buffers.unused = 0;
-        Ok(FrameBuffers { buffers, pool: Arc::clone(self), generation, held_epoch: 0, objects_epoch: 0 })
+        Ok(FrameBuffers { buffers, pool: Arc::clone(self), generation, held_epoch: 0, objects: Contents::default() })
     }
 
     fn take_free(&self) -> (Box<Buffers>, u64) {
@@ -119,8 +123,8 @@ pub(crate) struct FrameBuffers {
     generation: u64,
     /// The epoch of the object table that the buffers held when the frame began; 0 for none.
     held_epoch: u64,
-    /// The epoch of the frame's object table.
-    objects_epoch: u64,
+    /// The frame's objects.
+    objects: Contents,
 }
 
 impl Drop for FrameBuffers {
@@ -151,7 +155,7 @@ impl FrameBuffers {
         let buffers = &mut *self.buffers;
         // A frame that fails may have written some of its objects. Only its submission confirms that it wrote all.
         self.held_epoch = mem::take(&mut buffers.objects_epoch);
-        self.objects_epoch = request.objects.epoch();
+        self.objects = Contents { objects: request.objects.len(), epoch: request.objects.epoch() };
         buffers.set_passes(request);
         let objects = request.objects.len().max(1);
         let listed = request.list_capacity.max(1);
@@ -166,6 +170,9 @@ impl FrameBuffers {
         if reallocated {
             self.held_epoch = 0;
         }
+        let reads_previous = request.plan.columns().contains(&PREVIOUS_OBJECTS.layout());
+        let previous = reads_previous.then(|| self.pool.previous_objects.lock().reserve(device, objects));
+        buffers.objects.previous = previous.transpose()?.flatten();
         buffers.materials.update(device, uploads, layouts, materials)?;
         let processes = request.plan.processes().iter().zip(request.draws);
         let bytes = processes.map(|(planned, draws)| bytes_of_process(materials, planned, draws));
@@ -229,9 +236,30 @@ impl FrameBuffers {
         self.held_epoch
     }
 
+    /// What the frame copies before its passes and behind them, for processes that read its objects in the next frame.
+    ///
+    /// # Errors
+    /// If wgpu refuses.
+    pub(crate) fn copies_of_objects(
+        &self,
+        device: &wgpu::Device,
+    ) -> Result<[Option<wgpu::CommandBuffer>; 2], BackendError> {
+        let objects = &self.buffers.objects;
+        match objects.gpu_objects_buffer().zip(objects.previous.as_ref()) {
+            Some((source, bound)) => self.pool.previous_objects.lock().copies(device, source, self.objects, bound),
+            None => Ok([None, None]),
+        }
+    }
+
     /// The frame was submitted, so the buffers hold its objects for the next frame.
     pub(crate) fn keep_objects(&mut self) {
-        self.buffers.objects_epoch = self.objects_epoch;
+        self.buffers.objects_epoch = self.objects.epoch;
+        let mut previous_objects = self.pool.previous_objects.lock();
+        match self.buffers.objects.previous {
+            Some(_) => previous_objects.set_held(self.objects),
+            None if previous_objects.size() > 0 => *previous_objects = PreviousObjects::new(),
+            None => {}
+        }
     }
 
     /// The passes in submission order.

@@ -5,6 +5,7 @@ mod frame_buffers;
 mod material_buffer;
 mod object_buffers;
 mod pass_state;
+mod previous_objects;
 mod resource_bytes;
 mod wgpu_frame;
 

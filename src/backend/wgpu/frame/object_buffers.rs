@@ -11,7 +11,7 @@ use crate::backend::wgpu::resources::{
     ALIGNMENT, CountedQueue, GrowingBuffer, check_storage_binding_size, size_with_headroom,
 };
 use crate::backend::{BackendError, SceneLimits};
-use crate::scene::{ColumnLayout, SceneRef};
+use crate::scene::{ColumnLayout, PREVIOUS_OBJECTS, SceneRef};
 use crate::view::{GpuObject, ObjectTable};
 
 /// The buffers of a frame's objects: one of their GPU layouts, and one of each column that a process reads. What
@@ -19,6 +19,8 @@ use crate::view::{GpuObject, ObjectTable};
 pub(crate) struct ObjectBuffers {
     gpu_objects: ObjectBuffer,
     columns: Vec<(ColumnLayout, ObjectBuffer)>,
+    /// The values of [`PREVIOUS_OBJECTS`]; `None` if no process reads them.
+    pub(super) previous: Option<wgpu::Buffer>,
     maps_memory: bool,
     /// The most bytes of a buffer that a shader can bind.
     max_binding: u64,
@@ -28,7 +30,7 @@ impl ObjectBuffers {
     /// Buffers without room. `maps_memory`: see [`shares_memory`].
     pub(crate) fn new(maps_memory: bool) -> Self {
         let gpu_objects = ObjectBuffer::new("objects", maps_memory);
-        Self { gpu_objects, columns: Vec::new(), maps_memory, max_binding: 0 }
+        Self { gpu_objects, columns: Vec::new(), previous: None, maps_memory, max_binding: 0 }
     }
 
     /// Their sizes in bytes.
@@ -36,8 +38,8 @@ impl ObjectBuffers {
         self.all().map(|buffer| buffer.on_device().size())
     }
 
-    /// Makes room for this many objects, and for these columns and no others. Returns whether a buffer was reallocated,
-    /// and lost its contents.
+    /// Makes room for this many objects, and for these columns and no others, but for [`PREVIOUS_OBJECTS`]. Returns
+    /// whether a buffer was reallocated, and lost its contents.
     ///
     /// # Errors
     /// If the device allows no buffer of that size.
@@ -48,12 +50,13 @@ impl ObjectBuffers {
         objects: usize,
     ) -> Result<bool, BackendError> {
         self.max_binding = device.limits().max_storage_buffer_binding_size & !3;
-        if !self.columns.iter().map(|(layout, _)| layout).eq(columns) {
+        let columns = columns.iter().filter(|layout| **layout != PREVIOUS_OBJECTS.layout());
+        if !self.columns.iter().map(|(layout, _)| layout).eq(columns.clone()) {
             let new = |&layout: &ColumnLayout| (layout, ObjectBuffer::new(layout.name, self.maps_memory));
-            self.columns = columns.iter().map(new).collect();
+            self.columns = columns.clone().map(new).collect();
         }
         let mut reallocated = false;
-        let strides = columns.iter().map(|layout| layout.stride);
+        let strides = columns.map(|layout| layout.stride);
         for (buffer, stride) in self.all_mut().zip(std::iter::once(size_of::<GpuObject>()).chain(strides)) {
             check_storage_binding_size(device, objects * stride)?;
             reallocated |= buffer.reserve(device, objects * stride)?;
@@ -89,8 +92,18 @@ impl ObjectBuffers {
         self.binding(&self.gpu_objects)
     }
 
+    /// The buffer of the objects' GPU layouts; `None` before [`ObjectBuffers::reserve`].
+    pub(super) fn gpu_objects_buffer(&self) -> Option<&wgpu::Buffer> {
+        self.gpu_objects.on_device().buffer()
+    }
+
     /// The values of a column; `None` for one that the buffers do not have.
     pub(crate) fn column(&self, layout: ColumnLayout) -> Option<wgpu::BufferBinding<'_>> {
+        if layout == PREVIOUS_OBJECTS.layout() {
+            let size = |buffer: &wgpu::Buffer| NonZeroU64::new(buffer.size().min(self.max_binding));
+            let bound = |buffer| wgpu::BufferBinding { buffer, offset: 0, size: size(buffer) };
+            return self.previous.as_ref().map(bound);
+        }
         self.columns.iter().find(|(known, _)| *known == layout).and_then(|(_, buffer)| self.binding(buffer))
     }
 
@@ -240,7 +253,9 @@ impl ObjectBuffer {
     /// A buffer without room. `maps_memory`: see [`shares_memory`].
     fn new(label: &'static str, maps_memory: bool) -> Self {
         use wgpu::BufferUsages;
-        let usage = if maps_memory { BufferUsages::STORAGE | BufferUsages::MAP_WRITE } else { BufferUsages::STORAGE };
+        // Objects are copied for the next frame.
+        let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
+        let usage = if maps_memory { usage | BufferUsages::MAP_WRITE } else { usage };
         Self { label, on_device: GrowingBuffer::new(label, usage), usage: maps_memory.then(Arc::default) }
     }
 
@@ -549,7 +564,6 @@ mod tests {
     fn each_block_is_written_to_its_place() {
         const LARGE: ObjectColumn<[u32; 2048]> = ObjectColumn::new("large");
         const OBJECTS: usize = 2 * ObjectTable::BLOCK_SIZE + 10;
-        use wgpu::BufferUsages;
         let mut scene = Scene::new();
         let vertices = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
         let vertices = vertices.map(|position| Vertex { position, normal: [0.0, 0.0, 1.0], uv: [0.0; 2] });
@@ -568,12 +582,6 @@ mod tests {
         let (device, queue) = noop_device();
         for maps_memory in [false, true] {
             let mut buffers = ObjectBuffers::new(maps_memory);
-            buffers.reserve(&device, &[LARGE.layout()], OBJECTS).unwrap();
-            let mapped = if maps_memory { BufferUsages::MAP_WRITE } else { BufferUsages::empty() };
-            for buffer in buffers.all_mut() {
-                let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC | mapped;
-                buffer.on_device = GrowingBuffer::new("objects", usage);
-            }
             buffers.reserve(&device, &[LARGE.layout()], OBJECTS).unwrap();
             if maps_memory {
                 buffers.unmap();
