@@ -54,14 +54,15 @@ pub enum BackendError {
     },
     /// A process has more bindings of a kind than a shader may have on the device: those of Drawloom's own, see the
     /// [limits](crate::guide::limits), the targets and buffers that it declares, and its resources.
-    #[error("the {stage} shader of {process:?} has {needed} {kind}, and device limit {limit} is {allowed}: {shares}")]
+    #[error(
+        "the {stage} shader of {process:?} has {needed} bindings of the kind that device limit {limit} counts, which is \
+         {allowed}: {shares}"
+    )]
     BindingLimit {
         /// The process.
         process: String,
         /// Which shader: "vertex", "fragment" or "compute".
         stage: &'static str,
-        /// What there are too many of: "sampled textures", for example.
-        kind: &'static str,
         /// How many there are.
         needed: u64,
         /// Who has how many of them.

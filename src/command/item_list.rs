@@ -161,11 +161,13 @@ impl ItemList {
     }
 
     /// The number of ranks in a group. Bundles of groups of another size are other ones.
+    #[cfg(feature = "wgpu")]
     pub(crate) fn group_size(&self) -> usize {
         self.group
     }
 
     /// Equal versions are of equal bundles, whose items have equal keys and versions.
+    #[cfg(feature = "wgpu")]
     pub(crate) fn versions(&self) -> [Version; 2] {
         [self.version, self.contents_version]
     }

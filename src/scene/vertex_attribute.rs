@@ -69,7 +69,7 @@ pub const VERTEX_COLOR: VertexAttribute<[f32; 3]> = VertexAttribute::new("color"
 ///
 /// `@builtin(vertex_index)` is no such index. Meshes share buffers, so it begins where the mesh lies in them, which
 /// changes when meshes come and go. Levels of detail of [one mesh](super::Mesh::with_levels) have the vertices of the
-/// mesh; a [subdivided](super::Subdivision) mesh has vertices, and indices, of its own.
+/// mesh; a [subdivided](super::Mesh::subdivided) mesh has vertices, and indices, of its own.
 ///
 /// Meshes bring no values, but for those [in the engine's own buffers](super::Mesh::from_buffers): a process that reads
 /// the index leaves out objects whose mesh has none, and warns.

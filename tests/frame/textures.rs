@@ -99,12 +99,12 @@ fn an_error_says_whose_textures_are_too_many_for_a_shader() {
             continue;
         }
         let error = recorded.err().unwrap();
-        let Some(BackendError::BindingLimit { process, kind: "sampled textures", needed: 17, .. }) =
+        let Some(BackendError::BindingLimit { process, stage: "fragment", needed: 17, limit, .. }) =
             error.backend_error()
         else {
             panic!("{error}")
         };
-        assert_eq!(process, "textured");
+        assert_eq!((process.as_str(), *limit), ("textured", "max_sampled_textures_per_shader_stage"));
         assert!(error.to_string().contains("11 for its columns, materials and resources"), "{error}");
     }
 }

@@ -155,7 +155,7 @@ fn lit_surfaces() -> Result<(), Failed> {
     let maps = ShadowMaps { side: 512, cascades: 3, max_distance: 20.0, ..ShadowMaps::default() };
     let deferred = || Deferred::to_picture().shadow_maps(Some(maps));
     // One of each kind, all of them, and none.
-    let mut scenes: Vec<Vec<Light>> = lights.iter().map(|light| vec![light.clone()]).collect();
+    let mut scenes: Vec<Vec<Light>> = lights.iter().map(|light| vec![*light]).collect();
     scenes.extend([lights.to_vec(), Vec::new()]);
     // Small ones too, each of which reaches some tiles.
     let small = |index: i32| {

@@ -28,7 +28,7 @@ impl LightTiles {
     /// The marks, in whole numbers.
     pub const TARGET: Target = Target::new("light tiles");
 
-    /// [`lighting_shader`](crate::process::lighting_shader) for a process that samples the marks at the binding
+    /// [`lighting_shader`] for a process that samples the marks at the binding
     /// `tiles` of `@group(2)`. `illuminance_in_tile(pixel, position, normal)` is what `illuminance_at(position, normal)`
     /// is, at a pixel of the view's picture: `vec2<u32>(in.clip.xy)`, if `clip` is the built-in position.
     pub fn lighting_shader(tiles: u32, maps: Option<(u32, &ShadowMaps)>) -> String {

@@ -9,7 +9,7 @@ use drawloom::command::Cull;
 use drawloom::process::{
     ClearColor, Comparison, ComputeDispatch, Declare, Deferred, DepthBias, DrawCount, Draws, Exposure, Format,
     FullScreen, Fxaa, PipelineState, PostStep, ProceduralDraws, RenderProcess, Stencil, StorageBuffer, TargetSize,
-    ToneMapping, Workgroups,
+    ToneMapping, Workgroups, lighting_shader,
 };
 use drawloom::scene::ViewKind;
 use drawloom::task::Scheduler;
@@ -38,6 +38,7 @@ pub const CASES: &[NumberCase] = &[
             "process::DrawCount::Count::instances",
             "process::DrawCount::Count::vertices",
             "process::Workgroups::Count",
+            "process::lighting_shader",
             "process::DepthBias::clamp",
             "process::DepthBias::constant",
             "process::DepthBias::slope",
@@ -183,6 +184,10 @@ fn draws() -> Result<(), Failed> {
             let drawn = draw(Process { size: TargetSize::Picture, layers: None, draws: Draws::Procedural(draws) });
             ensure(drawn.is_ok() == number.is_finite(), format_args!("{depth_bias:?}: {drawn:?}"))?;
         }
+    }
+    for binding in COUNTS {
+        let shader = lighting_shader(Some((binding, &small_maps())));
+        ensure(shader.contains(&format!("@binding({binding}) ")), format_args!("binding {binding}"))?;
     }
     for mask in [0, 1, u8::MAX] {
         let stencils = [

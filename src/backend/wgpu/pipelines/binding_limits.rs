@@ -8,30 +8,26 @@ pub(super) struct GroupBindings<'a> {
     pub(super) entries: &'a [wgpu::BindGroupLayoutEntry],
 }
 
-/// A kind of bindings that devices limit, and its limit.
-type Kind = (&'static str, &'static str, fn(&wgpu::BindingType) -> bool, fn(&wgpu::Limits) -> u32);
+/// The limit of a kind of bindings: its name, which bindings it counts, and what a device allows.
+type Kind = (&'static str, fn(&wgpu::BindingType) -> bool, fn(&wgpu::Limits) -> u32);
 
 const KINDS: [Kind; 4] = [
     (
-        "sampled textures",
         "max_sampled_textures_per_shader_stage",
         |ty| matches!(ty, wgpu::BindingType::Texture { .. }),
         |limits| limits.max_sampled_textures_per_shader_stage,
     ),
     (
-        "samplers",
         "max_samplers_per_shader_stage",
         |ty| matches!(ty, wgpu::BindingType::Sampler(_)),
         |limits| limits.max_samplers_per_shader_stage,
     ),
     (
-        "storage buffers",
         "max_storage_buffers_per_shader_stage",
         |ty| is_buffer(ty, |ty| matches!(ty, wgpu::BufferBindingType::Storage { .. })),
         |limits| limits.max_storage_buffers_per_shader_stage,
     ),
     (
-        "uniform buffers",
         "max_uniform_buffers_per_shader_stage",
         |ty| is_buffer(ty, |ty| ty == wgpu::BufferBindingType::Uniform),
         |limits| limits.max_uniform_buffers_per_shader_stage,
@@ -57,7 +53,7 @@ pub(super) fn check_binding_limits(
     is_compute: bool,
 ) -> Result<(), BackendError> {
     for (stage, visibility) in STAGES.into_iter().filter(|(stage, _)| (*stage == "compute") == is_compute) {
-        for (kind, limit, is_kind, allowed) in KINDS {
+        for (limit, is_kind, allowed) in KINDS {
             let is_counted =
                 |entry: &&wgpu::BindGroupLayoutEntry| entry.visibility.contains(visibility) && is_kind(&entry.ty);
             let count = |group: &GroupBindings<'_>| group.entries.iter().filter(is_counted).count();
@@ -66,7 +62,7 @@ pub(super) fn check_binding_limits(
                 let shares = groups.iter().map(|group| (count(group), group.what)).filter(|(count, _)| *count > 0);
                 let shares: Vec<_> = shares.map(|(count, what)| format!("{count} {what}")).collect();
                 let (process, shares) = (process.to_owned(), shares.join(", "));
-                return Err(BackendError::BindingLimit { process, stage, kind, needed, shares, limit, allowed });
+                return Err(BackendError::BindingLimit { process, stage, needed, shares, limit, allowed });
             }
         }
     }
