@@ -74,6 +74,8 @@ pub(super) struct ListConditions {
     pub(super) chooses_levels: bool,
     /// Whether objects have layers of their own.
     pub(super) has_layers: bool,
+    /// Counts the [divisions](crate::view::TextureSets::divisions) of materials into sets of textures.
+    pub(super) texture_divisions: u64,
 }
 
 /// A static group, and what is recorded of it.

@@ -28,6 +28,7 @@ pub struct TextureSets {
     /// By slot.
     set_of_material: Vec<u32>,
     revision: u64,
+    divisions: u64,
 }
 
 /// The materials and textures of a scene at one time: of each the identity of the collection, its revision, and how
@@ -124,6 +125,11 @@ impl TextureSets {
         self.revision
     }
 
+    /// Counts how often a material came into another set than it was in.
+    pub fn divisions(&self) -> u64 {
+        self.divisions
+    }
+
     /// Brings them up to date with the assets. An array has at most `max_layers` textures.
     pub(crate) fn update(&mut self, assets: &Assets, max_layers: u32) {
         let Assets { materials, textures, .. } = assets;
@@ -138,7 +144,8 @@ impl TextureSets {
         }
         let is_other = |before: Version| (before[1].0, before[2]) != (version[1].0, version[2]);
         if before.is_some_and(is_other) {
-            *self = Self { version: self.version, revision: self.revision + 1, ..Self::default() };
+            let (version, revision, divisions) = (self.version, self.revision + 1, self.divisions + 1);
+            *self = Self { version, revision, divisions, ..Self::default() };
         }
         if self.update_textures(assets, max_layers) | self.update_sets(assets) {
             self.revision += 1;
@@ -231,6 +238,8 @@ impl TextureSets {
             }
         }
         let has_changed = (&self.sets, &self.set_of_material) != (&sets, &set_of_material);
+        let mut known = self.set_of_material.iter().zip(&set_of_material);
+        self.divisions += u64::from(known.any(|(before, now)| before != now));
         (self.sets, self.set_of_material) = (sets, set_of_material);
         has_changed
     }

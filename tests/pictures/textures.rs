@@ -7,8 +7,8 @@ use drawloom::command::Selection;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{CommandDraws, Declare, Deferred, Draws, InjectionPoint, RenderProcess};
 use drawloom::scene::{
-    Blend, Camera, Filter, Material, MaterialType, Mesh, Outside, Projection, RenderObject, Sampler, Scene, Texture,
-    TextureFormat, Topology, Vertex,
+    Blend, Camera, Changes, Filter, Material, MaterialType, Mesh, Outside, Projection, RenderObject, Sampler, Scene,
+    SceneRef, StaticGroup, Texture, TextureFormat, Topology, Vertex,
 };
 use drawloom::task::Scheduler;
 use drawloom_testing::random::Random;
@@ -24,6 +24,7 @@ pub const CASES: &[Case] = &[
     ("a_texture_shows_its_texels_whatever_its_size_and_format", texels),
     ("textures_of_many_sizes_are_each_on_their_object_with_every_strategy", many_sizes),
     ("textures_that_are_replaced_by_others_of_other_sizes_are_drawn", replaced),
+    ("static_groups_show_textures_that_are_replaced", static_groups),
     ("a_shader_finds_each_texture_of_a_material_in_its_place", places),
     ("textures_are_read_as_their_samplers_say", samplers),
 ];
@@ -166,6 +167,38 @@ fn replaced() -> Result<(), Failed> {
         }
     }
     Ok(())
+}
+
+/// Objects that never change, while their textures, and those of others, do: materials come into other sets.
+fn static_groups() -> Result<(), Failed> {
+    let mut random = Random::stream(9);
+    let (textures, mut colors): (Vec<_>, Vec<_>) =
+        (0..30).map(|index| colored(&mut random, index)).collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
+    let mut scene = wall(6, &textures, Blend::None)?;
+    let objects: Vec<_> = scene.objects().take(20).collect();
+    scene.static_groups = vec![StaticGroup::new("wall", scene.object_set(objects)?)];
+    let handles: Vec<_> = scene.assets().iter::<Texture>().map(|(handle, _)| handle).collect();
+    let mut fixture = Fixture::new()?;
+    let mut executed = 0;
+    for frame in 0..40 {
+        let changes = if frame == 0 { Changes::Unknown } else { Changes::NONE };
+        let recorded = fixture.renderer.record(SceneRef { changes, ..scene.as_scene_ref() })?;
+        executed += usize::from(recorded.statistics().views.iter().any(|view| view.static_groups > 0));
+        let picture = fixture.submit(recorded)?.read(0, "radiance")?;
+        for (index, color) in (0..).zip(&colors) {
+            let found = tile(&picture, 6, index);
+            if found.iter().zip(color).any(|(found, expected)| found.abs_diff(*expected) > 1) {
+                return Err(format!("frame {frame}: tile {index} is {found:?}, not {color:?}").into());
+            }
+        }
+        for _ in 0..if frame % 4 == 3 { 2 } else { 0 } {
+            let (slot, number) = (random.below(30), random.below(60) as u32);
+            let (texture, color) = colored(&mut random, number)?;
+            scene.replace(handles[slot], texture)?;
+            colors[slot] = color;
+        }
+    }
+    if executed > 20 { Ok(()) } else { Err(format!("static groups are executed in {executed} frames").into()) }
 }
 
 /// Materials of this type have up to six textures.

@@ -311,7 +311,8 @@ impl<B: Backend> StageGraph<B> {
             let of_pass = (*mode, selection, culls_triangles);
             table.begin_frame(frame, of_pass, tables.objects.len(), granularity);
         }
-        let conditions = ListConditions { culls_triangles, chooses_levels, has_layers: !scene.layers.is_empty() };
+        let (has_layers, texture_divisions) = (!scene.layers.is_empty(), tables.objects.texture_sets().divisions());
+        let conditions = ListConditions { culls_triangles, chooses_levels, has_layers, texture_divisions };
         tables.begin_static_groups(scene, conditions, &self.passes)?;
         self.tuning.occlusion.begin_frame(tables, scene.assets, views);
         if chooses_levels {
