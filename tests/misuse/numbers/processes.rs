@@ -8,8 +8,8 @@ use drawloom::backend::{NullBackend, Picture, PipelineLibrary, SoftwareBackend};
 use drawloom::command::Cull;
 use drawloom::process::{
     ClearColor, Comparison, ComputeDispatch, Declare, Deferred, DepthBias, DrawCount, Draws, Exposure, Format,
-    FullScreen, Fxaa, PipelineState, PostStep, ProceduralDraws, RenderProcess, Stencil, StorageBuffer, TargetSize,
-    ToneMapping, Workgroups, lighting_shader,
+    FullScreen, Fxaa, LightTiles, PipelineState, PostStep, ProceduralDraws, RenderProcess, Stencil, StorageBuffer,
+    TargetSize, ToneMapping, Workgroups, lighting_shader, targets,
 };
 use drawloom::scene::ViewKind;
 use drawloom::task::Scheduler;
@@ -38,7 +38,6 @@ pub const CASES: &[NumberCase] = &[
             "process::DrawCount::Count::instances",
             "process::DrawCount::Count::vertices",
             "process::Workgroups::Count",
-            "process::lighting_shader",
             "process::DepthBias::clamp",
             "process::DepthBias::constant",
             "process::DepthBias::slope",
@@ -80,6 +79,11 @@ pub const CASES: &[NumberCase] = &[
         check: shares,
     },
     NumberCase { name: "shadow_maps_of_any_numbers", numbers: &[], check: shadow_maps },
+    NumberCase {
+        name: "shaders_that_light_at_any_binding",
+        numbers: &["process::lighting_shader", "process::LightTiles::lighting_shader"],
+        check: lighting_shaders,
+    },
 ];
 
 /// A process that draws into a target of its own.
@@ -185,10 +189,6 @@ fn draws() -> Result<(), Failed> {
             ensure(drawn.is_ok() == number.is_finite(), format_args!("{depth_bias:?}: {drawn:?}"))?;
         }
     }
-    for binding in COUNTS {
-        let shader = lighting_shader(Some((binding, &small_maps())));
-        ensure(shader.contains(&format!("@binding({binding}) ")), format_args!("binding {binding}"))?;
-    }
     for mask in [0, 1, u8::MAX] {
         let stencils = [
             Stencil::mark(mask),
@@ -203,6 +203,62 @@ fn draws() -> Result<(), Failed> {
                 draw(Process { size: TargetSize::Picture, layers: None, draws })
                     .map_err(|failed| failed.message().unwrap_or_default().to_owned()),
                 "stencil",
+            )?;
+        }
+    }
+    Ok(())
+}
+
+/// A process that is lit at each pixel.
+struct Lit {
+    shader: String,
+    has_tiles: bool,
+}
+
+impl RenderProcess for Lit {
+    fn name(&self) -> &str {
+        "lit"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        if self.has_tiles {
+            declare.samples(LightTiles::TARGET);
+        }
+        declare.samples_layers(ViewKind::Shadow, targets::SHADOW_MAP);
+        declare.clears_color("own", Format::Rgba8Unorm, ClearColor::Value([0.0; 4]));
+        declare.keep();
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::FullScreen(FullScreen { shader: &self.shader, ..FullScreen::default() })
+    }
+}
+
+/// A binding that is not that of the target is an error of the process, and not of the device.
+fn lighting_shaders() -> Result<(), Failed> {
+    let maps = small_maps();
+    for number in COUNTS.into_iter().chain([2]) {
+        let lit = |lighting: String, illuminance: &str| {
+            let has_tiles = illuminance.contains("tile");
+            let fragment = "@fragment fn fragment(in: FullScreenPixel) -> @location(0) vec4<f32>";
+            let shader = format!("{lighting}\n{fragment} {{ return vec4<f32>({illuminance}, 1.0); }}");
+            let builder = Renderer::builder(noop_backend()?).pipeline(Deferred::to_picture().shadow_maps(Some(maps)));
+            let builder = builder.process(LightTiles).process(Lit { shader, has_tiles });
+            let (renderer, submitter) = builder.build(Arc::new(Scheduler::new(1)?))?;
+            Fixture { renderer, submitter }.draw(&scene()).map(drop)
+        };
+        let at = "illuminance_at(vec3<f32>(1.0), vec3<f32>(0.0, 1.0, 0.0))";
+        let in_tile = "illuminance_in_tile(vec2<u32>(in.position.xy), vec3<f32>(1.0), vec3<f32>(0.0, 1.0, 0.0))";
+        for (drawn, expected) in [
+            (lit(lighting_shader(Some((number, &maps))), at), 1),
+            (lit(LightTiles::lighting_shader(number, Some((2, &maps))), in_tile), 1),
+            (lit(LightTiles::lighting_shader(1, Some((number, &maps))), in_tile), 2),
+        ] {
+            let is_right = number == expected;
+            let names_it = |failed: &Failed| failed.message().is_some_and(|message| message.contains("\"lit\""));
+            ensure(
+                if is_right { drawn.is_ok() } else { drawn.as_ref().is_err_and(names_it) },
+                format_args!("binding {number}: {drawn:?}"),
             )?;
         }
     }
