@@ -12,8 +12,6 @@ pub(crate) const COLOR: VertexAttribute<[f32; 4]> = VertexAttribute::new("color"
 pub(crate) const JOINTS: VertexAttribute<[u32; 4]> = VertexAttribute::new("joints");
 /// How much each of them does; 1 in all.
 pub(crate) const WEIGHTS: VertexAttribute<[f32; 4]> = VertexAttribute::new("weights");
-/// The number of a vertex in its mesh, by which the shader finds its morph targets.
-pub(crate) const NUMBER: VertexAttribute<u32> = VertexAttribute::new("number");
 
 /// How an object is deformed.
 pub(crate) const POSE: ObjectColumn<Pose> = ObjectColumn::new("pose");

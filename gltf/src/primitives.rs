@@ -4,7 +4,7 @@ use drawloom::glam::Vec3;
 use drawloom::scene::{Mesh, Topology, Vertex};
 
 use crate::accessors::Accessors;
-use crate::attributes::{COLOR, JOINTS, NUMBER, SECOND_UV, TANGENT, WEIGHTS};
+use crate::attributes::{COLOR, JOINTS, SECOND_UV, TANGENT, WEIGHTS};
 use crate::element::{Element, Kind};
 use crate::error::{Problem, excerpt};
 use crate::morph_targets::{MorphTargets, check_count};
@@ -93,10 +93,6 @@ impl PrimitiveReader<'_, '_> {
             mesh = mesh.with_attribute(COLOR, &values).map_err(refused())?;
         }
         let targets = MorphTargets::read(accessors, primitive, count, morphs, warnings)?;
-        if !targets.reach.is_empty() {
-            let numbers: Vec<_> = (0..count as u32).collect();
-            mesh = mesh.with_attribute(NUMBER, &numbers).map_err(refused())?;
-        }
         let joints = self.joints(&attributes, &positions);
         let joints = warnings.keep(joints, format_args!("{primitive} is drawn without its joints"))?.flatten();
         let joints = match joints {

@@ -3,25 +3,20 @@
 use std::sync::Arc;
 
 use drawloom::process::{Declare, Deformation, ShaderResource};
-use drawloom::scene::LayerMask;
+use drawloom::scene::{LayerMask, VERTEX_INDEX};
 
-use crate::attributes::{DEFORMED, JOINTS, NUMBER, POSE, TANGENT, WEIGHTS};
+use crate::attributes::{DEFORMED, JOINTS, POSE, TANGENT, WEIGHTS};
 
 /// Morphs and skins objects in every process of the pipeline.
 #[derive(Clone)]
 pub(crate) struct SkinsAndMorphs {
-    shader: Arc<str>,
     /// The joints of all objects, then the morph data.
     resources: [Arc<[u8]>; 2],
 }
 
 impl SkinsAndMorphs {
-    /// For processes whose shader has this number of bindings of materials between the columns and the resources.
-    pub(crate) fn new(palette: Arc<[u8]>, morphs: Arc<[u8]>, material_bindings: u32) -> Self {
-        let shader = include_str!("deformation.wgsl");
-        let shader = shader.replace("PALETTE", &(1 + material_bindings).to_string());
-        let shader = shader.replace("MORPHS", &(2 + material_bindings).to_string());
-        Self { shader: shader.into(), resources: [palette, morphs] }
+    pub(crate) fn new(palette: Arc<[u8]>, morphs: Arc<[u8]>) -> Self {
+        Self { resources: [palette, morphs] }
     }
 }
 
@@ -38,12 +33,12 @@ impl Deformation for SkinsAndMorphs {
         declare.reads_column(POSE);
         declare.reads_attribute(JOINTS, [0; 4]);
         declare.reads_attribute(WEIGHTS, [1.0, 0.0, 0.0, 0.0]);
-        declare.reads_attribute(NUMBER, 0);
+        declare.reads_attribute(VERTEX_INDEX, 0);
         declare.reads_attribute(TANGENT, [0.0; 4]);
     }
 
     fn shader(&self) -> &str {
-        &self.shader
+        include_str!("deformation.wgsl")
     }
 
     fn resources(&self) -> Vec<ShaderResource<'_>> {

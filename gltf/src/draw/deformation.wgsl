@@ -7,9 +7,9 @@ struct Pose {
 }
 
 @group(3) @binding(0) var<storage, read> poses: array<Pose>;
-@group(3) @binding(PALETTE) var<storage, read> palette: array<mat4x4<f32>>;
+@group(3) @binding(FIRST_RESOURCE) var<storage, read> palette: array<mat4x4<f32>>;
 // Nine numbers for each vertex of each morph target, and weights.
-@group(3) @binding(MORPHS) var<storage, read> morphs: array<f32>;
+@group(3) @binding(FIRST_RESOURCE + 1u) var<storage, read> morphs: array<f32>;
 
 // The morph targets, then the joints.
 fn deform(in: VertexInput, object: Object) -> VertexInput {
@@ -18,7 +18,7 @@ fn deform(in: VertexInput, object: Object) -> VertexInput {
     for (var target_index = 0u; target_index < pose.target_count; target_index++) {
         let weight = morphs[pose.first_weight + target_index];
         if weight != 0.0 {
-            let first = pose.first_target + (target_index * pose.vertex_count + in.number) * 9u;
+            let first = pose.first_target + (target_index * pose.vertex_count + in.vertex_index) * 9u;
             out.position += weight * morph(first);
             out.normal += weight * morph(first + 3u);
             out.tangent += vec4<f32>(weight * morph(first + 6u), 0.0);

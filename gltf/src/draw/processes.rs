@@ -17,12 +17,10 @@ use crate::world::World;
 ///
 /// The renderer draws this world only: another one needs another renderer.
 pub fn add_world<B: Backend>(builder: RendererBuilder<B>, mut deferred: Deferred, world: &World) -> RendererBuilder<B> {
-    let deformation = |material_bindings| {
-        SkinsAndMorphs::new(Arc::clone(&world.palette), Arc::clone(&world.morphs), material_bindings)
-    };
+    let deformation = || SkinsAndMorphs::new(Arc::clone(&world.palette), Arc::clone(&world.morphs));
     let has_deformed = world.surfaces.iter().any(|&(_, is_deformed)| is_deformed);
     if has_deformed {
-        deferred = deferred.deformation(deformation(0));
+        deferred = deferred.deformation(deformation());
     }
     // Without a light that casts shadows, nothing else would clear the maps into which masked surfaces are drawn.
     if world.surfaces.iter().any(|&(kind, _)| kind == SurfaceKind::Masked) {
@@ -33,7 +31,7 @@ pub fn add_world<B: Backend>(builder: RendererBuilder<B>, mut deferred: Deferred
     let mut builder = builder.pipeline(deferred);
     let (mut previous, mut previous_casters) = (None, last);
     for &(kind, is_deformed) in &world.surfaces {
-        let draw = |kind, after| Surfaces::new(kind, is_deformed.then(|| deformation(1)), after);
+        let draw = |kind, after| Surfaces::new(kind, is_deformed.then(deformation), after);
         if kind == SurfaceKind::Masked {
             let casters = draw(SurfaceKind::MaskedCasters, previous_casters);
             previous_casters = Some(casters.name().to_owned());
