@@ -568,6 +568,7 @@ impl World {
             name: "any".into(),
             diffuse: spec.diffuse.color(),
             texture: spec.texture.filter(|_| !textures.is_empty()).map(|texture| *pick(textures, texture)),
+            textures: Vec::new(),
             emission: spec.emission.map_or(Vec3::ZERO, Vector::color),
             opacity: (spec.opacity.0.abs() / 4.0) as f32,
             blend: *pick(&blends, spec.blend),

@@ -61,15 +61,13 @@ struct GpuMaterial {
     diffuse: Vec3,
     opacity: f32,
     emission: Vec3,
-    texture_array: u32,
-    texture_layer: u32,
+    alpha_cutoff: f32,
     double_sided: u32,
     blend: u32,
-    padding: u32,
+    textures: [u32; Material::MAX_TEXTURES],
 }
 
-const NO_TEXTURE: u32 = 4;
-const TEXTURE_ARRAYS: u32 = 4;
+const NO_TEXTURE: u32 = u32::MAX;
 
 impl Device {
     /// # Errors
@@ -266,11 +264,10 @@ fn gpu_material(material: &Material) -> GpuMaterial {
         diffuse: material.diffuse,
         opacity: material.opacity,
         emission: material.emission,
-        texture_array: NO_TEXTURE,
-        texture_layer: 0,
+        alpha_cutoff: 0.0,
         double_sided: u32::from(material.double_sided),
         blend: material.blend as u32,
-        padding: 0,
+        textures: [NO_TEXTURE; Material::MAX_TEXTURES],
     }
 }
 
@@ -351,15 +348,15 @@ fn material_group(device: &wgpu::Device, materials: &wgpu::Buffer) -> (wgpu::Bin
     let storage = buffer_binding(wgpu::BufferBindingType::Storage { read_only: true });
     let array = texture_binding(wgpu::TextureViewDimension::D2Array, true);
     let sampler = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
-    let bindings = [storage].into_iter().chain((0..TEXTURE_ARRAYS).map(|_| array)).chain([sampler]);
-    let layout = layout(device, bindings);
+    let bindings = [[array; Material::MAX_TEXTURES], [sampler; Material::MAX_TEXTURES]];
+    let layout = layout(device, [storage].into_iter().chain(bindings.into_iter().flatten()));
     let texture = new_target(device, [1, 1], wgpu::TextureFormat::Rgba8UnormSrgb, wgpu::TextureUsages::TEXTURE_BINDING);
     let dimension = Some(wgpu::TextureViewDimension::D2Array);
     let view = texture.create_view(&wgpu::TextureViewDescriptor { dimension, ..Default::default() });
     let sampler = device.create_sampler(&wgpu::SamplerDescriptor::default());
     let mut resources = vec![materials.as_entire_binding()];
-    resources.extend((0..TEXTURE_ARRAYS).map(|_| wgpu::BindingResource::TextureView(&view)));
-    resources.push(wgpu::BindingResource::Sampler(&sampler));
+    resources.extend([(); Material::MAX_TEXTURES].map(|()| wgpu::BindingResource::TextureView(&view)));
+    resources.extend([(); Material::MAX_TEXTURES].map(|()| wgpu::BindingResource::Sampler(&sampler)));
     let group = group(device, &layout, resources);
     (layout, group)
 }
