@@ -36,7 +36,8 @@ fuzz_target!(|input: &[u8]| {
         // A mask that is opaque everywhere is no texture.
         let missing = usize::from(colors.texture.is_none()) + usize::from(mask.texture.is_none());
         assert!(missing >= unusable && (colors.texture.is_some() || unusable >= 1), "{:?}", imported.warnings);
-        assert!(mask.texture.is_none() || mask.blend == Blend::Alpha);
+        // What a mask hides is blended, or cut out.
+        assert!(mask.texture.is_none() || (mask.blend == Blend::Alpha) != mask.alpha_cutoff.is_some(), "{mask:?}");
         assert!(scene.assets.iter::<Texture>().count() <= 2);
     });
 });
