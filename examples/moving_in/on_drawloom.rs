@@ -67,13 +67,11 @@ impl OnDrawloom {
         }
         let moving = 0..engine.moving as u32;
         let items_of = |process| Items {
-            process,
-            keys: &engine.keys,
             bounds: &self.bounds,
             layers: &self.layers,
             versions: &self.versions,
             changes: Changes::Ranges(slice::from_ref(&moving)),
-            recorder: ItemRecorder::Any(engine),
+            ..Items::new(process, &engine.keys, ItemRecorder::Any(engine))
         };
         let recorded = self.renderer.record_with(FrameInputs {
             items: &[items_of(ShadowMap.name()), items_of(Surfaces.name())],

@@ -36,8 +36,8 @@ pub struct FrameRequest<'a> {
     pub scene: &'a SceneRef<'a>,
     /// The items that the engine lends.
     pub items: &'a [Items<'a>],
-    /// The items of each process, by index; `None` for one that draws no items.
-    pub items_of_process: &'a [Option<usize>],
+    /// The items of each pass, by index among those that are lent; `None` for one that draws no items.
+    pub items_of_passes: &'a [Option<usize>],
     /// What all views need to know about the scene's objects. Blocks are complete when they are uploaded.
     pub objects: &'a ObjectTable,
     /// The most objects that a draw list has: all of the scene, and once more those of its static groups.
@@ -60,9 +60,9 @@ pub struct FrameRequest<'a> {
 }
 
 impl<'a> FrameRequest<'a> {
-    /// All items that the engine lends for a process, by index; `None` if it draws none.
-    pub fn items_of(&self, process: usize) -> Option<&'a Items<'a>> {
-        self.items_of_process.get(process).copied().flatten().map(|index| &self.items[index])
+    /// All items that the engine lends for a pass, by index; `None` if it draws none.
+    pub fn items_of(&self, pass: usize) -> Option<&'a Items<'a>> {
+        self.items_of_passes.get(pass).copied().flatten().map(|index| &self.items[index])
     }
 
     /// One of the views, by index.
@@ -133,9 +133,9 @@ pub struct PassRequest<'a> {
 }
 
 impl<'a> PassRequest<'a> {
-    /// All items that the engine lends for the process; `None` if it draws none.
+    /// All items that the engine lends for the pass; `None` if it draws none.
     pub fn items(&self) -> Option<&'a Items<'a>> {
-        self.frame.items_of(self.pass.process_index)
+        self.frame.items_of(self.index)
     }
 
     /// Divides a time that was spent on passes together among them, by what each costs relative to the others: a share

@@ -14,13 +14,15 @@ use crate::bit_set::{BITS_PER_WORD, set_bits};
 pub struct ItemList {
     items: Vec<u32>,
     bundles: Vec<ItemBundle>,
-    /// The number of ranks in a group; 0 before the first frame.
+    /// The number of ranks in a group; 0 where groups do not divide the list.
     group: usize,
     size: BundleSize,
     slots: usize,
     /// What it was made from, and the version that it has since; `None` if it is empty.
     made_from: Option<MadeFrom>,
     version: Version,
+    /// The set of items, by the version of the frame that began with it.
+    pub(crate) set: Version,
     /// The version of the keys and versions of all items that are lent.
     pub(crate) contents_version: Version,
 }
@@ -191,33 +193,27 @@ impl ItemList {
             let blocks = order.len().div_ceil(Self::BLOCK_SIZE);
             (0..blocks).map(|block| count_of(visible(block))).sum()
         };
-        self.choose_group(count, order.len(), changes);
+        match per_bundle {
+            Some(_) => self.group = 0,
+            None => self.choose_group(count, order.len(), changes),
+        }
         if !is_same || self.made_from != made_from(self) {
-            self.fill(order, visible, count);
-            if let Some(per_bundle) = per_bundle {
-                self.divide_evenly(per_bundle);
+            self.fill(order, &visible, count);
+            match per_bundle {
+                Some(per_bundle) => self.divide_evenly(per_bundle),
+                None => self.divide_by_groups(order.len(), &visible),
             }
             (self.made_from, self.version) = (made_from(self), version);
         }
     }
 
-    /// Makes it the list of the visible ones of these items, which are `count`.
-    fn fill(&mut self, order: &[u32], visible: impl Fn(usize) -> BlockBits, count: usize) {
+    /// Makes it the list of the visible ones of these items, which are `count`, without bundles.
+    fn fill(&mut self, order: &[u32], visible: &impl Fn(usize) -> BlockBits, count: usize) {
         self.clear();
         self.items.reserve(count);
-        let step = self.group.min(Self::BLOCK_SIZE);
-        let (mut slot, mut start, mut end) = (0, 0, 0);
         for (block, order) in order.chunks(Self::BLOCK_SIZE).enumerate() {
-            let (first, words) = (block * Self::BLOCK_SIZE, visible(block));
-            for rank in (first..first + order.len()).step_by(step) {
-                let count = count_of_ranks(words, rank - first, step);
-                if rank % self.group == 0 || end + count - start > Self::ITEMS_PER_BUNDLE {
-                    self.end_bundle(slot, start..end);
-                    (slot, start) = (rank / Self::MIN_GROUP, end);
-                }
-                end += count;
-            }
-            let before = self.items.len();
+            let (words, before) = (visible(block), self.items.len());
+            let end = before + count_of(words);
             if end - before == order.len() {
                 self.items.extend_from_slice(order);
                 continue;
@@ -227,8 +223,25 @@ impl ItemList {
             let seen = bits.flat_map(|(word, bits)| set_bits(bits).map(move |bit| word * BITS_PER_WORD + bit));
             self.items[before..].iter_mut().zip(seen).for_each(|(item, rank)| *item = order[rank]);
         }
+    }
+
+    /// Divides it into bundles of the groups of `ranks` ranks.
+    fn divide_by_groups(&mut self, ranks: usize, visible: &impl Fn(usize) -> BlockBits) {
+        let step = self.group.min(Self::BLOCK_SIZE);
+        let (mut slot, mut start, mut end) = (0, 0, 0);
+        for first in (0..ranks).step_by(Self::BLOCK_SIZE) {
+            let words = visible(first / Self::BLOCK_SIZE);
+            for rank in (first..ranks.min(first + Self::BLOCK_SIZE)).step_by(step) {
+                let count = count_of_ranks(words, rank - first, step);
+                if rank % self.group == 0 || end + count - start > Self::ITEMS_PER_BUNDLE {
+                    self.end_bundle(slot, start..end);
+                    (slot, start) = (rank / Self::MIN_GROUP, end);
+                }
+                end += count;
+            }
+        }
         self.end_bundle(slot, start..end);
-        self.slots = order.len().div_ceil(Self::MIN_GROUP);
+        self.slots = ranks.div_ceil(Self::MIN_GROUP);
     }
 
     /// Adds a bundle of this range of items, unless it is empty.
@@ -272,7 +285,6 @@ impl ItemList {
         let (items, per_bundle) = (self.items.len(), per_bundle.max(1));
         self.slots = items.div_ceil(per_bundle);
         let bundle = |slot| ItemBundle { end: items.min((slot + 1) * per_bundle), slot };
-        self.bundles.clear();
         self.bundles.extend((0..self.slots).map(bundle));
     }
 }

@@ -92,11 +92,13 @@ pub enum FrameError {
     /// The scene cannot be drawn.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// A process draws items, and the engine lends none for it. A frame without items lends empty slices.
-    #[error("process {process:?} draws items, and none are lent for it")]
+    /// A process draws items in a view, and the engine lends none for that. A frame without items lends empty slices.
+    #[error("process {process:?} draws items in view {view:?}, and none are lent for it")]
     MissingItems {
         /// The process.
         process: String,
+        /// The view.
+        view: String,
     },
     /// Items are lent for a process that does not draw items.
     #[error("items are lent for process {process:?}, which does not draw items")]
@@ -104,11 +106,21 @@ pub enum FrameError {
         /// The process.
         process: String,
     },
-    /// Two sets of items are lent for one process.
-    #[error("two sets of items are lent for process {process:?}")]
+    /// Two sets of items are lent for a process in one view.
+    #[error("two sets of items are lent for process {process:?} in view {view:?}")]
     RepeatedItems {
         /// The process.
         process: String,
+        /// The view.
+        view: String,
+    },
+    /// [`Items::data`](crate::process::Items::data) has a length that is not a multiple of 4.
+    #[error("the items of process {process:?} have {bytes} bytes of data, which is not a multiple of 4")]
+    ItemDataSize {
+        /// The process.
+        process: String,
+        /// The length of the data.
+        bytes: usize,
     },
     /// Slices of [`Items`](crate::process::Items) whose lengths differ.
     #[error("the items of process {process:?} have {keys} keys but {count} {slice}")]

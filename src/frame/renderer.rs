@@ -352,7 +352,6 @@ impl<B: Backend> Renderer<B> {
 
         // Views → the job graph of their stages, and what all its jobs share.
         let draws = plan.draws()?;
-        find_items((items, scope.lacks_items), &plan, &draws, &mut self.tables.items_of_process)?;
         plan.check_scene(&draws, scene, self.tables.objects.material_types())?;
         self.tables.culling.update(scene.assets, self.tables.objects.used_meshes());
         self.tables.mesh_levels.update(scene.assets, self.tables.objects.used_meshes());
@@ -365,9 +364,11 @@ impl<B: Backend> Renderer<B> {
         };
         let nodes = self.node_declarations.lend(nodes)?;
         let graph = self.graphs.get(&plan, &draws, views, features, nodes)?;
+        let (of_plan, of_views) = ((&*plan, &*draws), (&*graph.passes, &**views));
+        find_items((items, scope.lacks_items), of_plan, of_views, &mut self.tables.items_of_passes)?;
         let workers = self.scheduler.workers();
         graph.begin_frame(&mut self.tables, scene, (views, &draws), &self.quality, workers, self.granularity)?;
-        self.tables.begin_items(items, (&plan, &draws), (&graph.passes, views), self.quality.culling)?;
+        self.tables.begin_items(items, of_plan, of_views, self.quality.culling)?;
         let clock = StageClock::new(self.scheduler.timeline());
         let separate_shadowed_lights = self.plans.separates_shadowed_lights();
         let fill_lights = || self.tables.fill_lights(&frame_views, separate_shadowed_lights, limits);
@@ -382,7 +383,7 @@ impl<B: Backend> Renderer<B> {
             sampled_views: &graph.sampled_views,
             scene,
             items,
-            items_of_process: &self.tables.items_of_process,
+            items_of_passes: &self.tables.items_of_passes,
             objects: &self.tables.objects,
             list_capacity: self.tables.objects.len() + self.tables.static_groups.listed_objects(),
             generated: &nodes.declarations.generated,

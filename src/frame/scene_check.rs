@@ -7,11 +7,11 @@ use super::FrameError;
 use crate::backend::{Backend, CallPanic, FrameRequest, GuardedBackend, SceneLimits};
 use crate::bit_set::BitWord;
 use crate::handle::Handle;
-use crate::process::{Draws, FramePlan, Items, Requirements};
+use crate::process::{Draws, FramePlan, Items, Pass, Requirements};
 use crate::quality::VertexFormat;
 use crate::scene::{Assets, ColumnLayout, LayerMask, Material, Mesh, ObjectColumn, SceneError, SceneRef};
 use crate::unwind::emit;
-use crate::view::{IssueReason, ObjectTable, TableLimits};
+use crate::view::{IssueReason, ObjectTable, RenderView, TableLimits};
 
 /// # Errors
 /// If no frame can be made of the scene.
@@ -35,29 +35,44 @@ pub(super) fn check_scene(scene: &SceneRef<'_>) -> Result<(), FrameError> {
     Ok(())
 }
 
-/// Finds the items of each process, by index among those that are lent. Items for a process that the plan does not have
-/// are left alone; `may_lack_items` says whether a process may have none.
+/// Finds the items of each pass, by index among those that are lent. Items for a process or a view that the frame does not
+/// have are left alone; `may_lack_items` says whether a pass may have none.
 ///
 /// # Errors
-/// If the items do not fit the processes, or a set of them is invalid as a whole.
+/// If the items do not fit the passes, or a set of them is invalid as a whole.
 pub(super) fn find_items(
     (items, may_lack_items): (&[Items<'_>], bool),
-    plan: &FramePlan,
-    draws: &[Draws<'_>],
+    (plan, draws): (&FramePlan, &[Draws<'_>]),
+    (passes, views): (&[Pass], &[RenderView]),
     found: &mut Vec<Option<usize>>,
 ) -> Result<(), FrameError> {
-    found.clear();
-    for (planned, draws) in plan.processes().iter().zip(draws) {
-        let mut lent = items.iter().zip(0..).filter(|(lent, _)| lent.process == planned.name);
-        let (first, process) = (lent.next(), || planned.name.clone());
-        match (draws, first) {
-            (Draws::Items(_), None) if !may_lack_items => return Err(FrameError::MissingItems { process: process() }),
-            (Draws::Items(_), Some((first, _))) if lent.next().is_none() => check_items(first)?,
-            (Draws::Items(_), Some(_)) => return Err(FrameError::RepeatedItems { process: process() }),
-            (_, Some(_)) => return Err(FrameError::UnexpectedItems { process: process() }),
-            (_, None) => {}
+    for lent in items {
+        let process = plan.processes().iter().position(|planned| planned.name == lent.process);
+        match process.map(|process| &draws[process]) {
+            Some(Draws::Items(_)) => check_items(lent)?,
+            Some(_) => return Err(FrameError::UnexpectedItems { process: lent.process.to_owned() }),
+            None => {}
         }
-        found.push(first.map(|(_, index)| index));
+    }
+    found.clear();
+    for pass in passes {
+        if !matches!(draws[pass.process_index], Draws::Items(_)) {
+            found.push(None);
+            continue;
+        }
+        let (planned, view) = (&plan.processes()[pass.process_index], &views[pass.view_index]);
+        let is_of_pass = |lent: &Items<'_>| lent.process == planned.name && lent.views.contains(view);
+        let mut of_pass = items.iter().zip(0..).filter(|(lent, _)| is_of_pass(lent)).map(|(_, index)| index);
+        let (first, names) = (of_pass.next(), || (planned.name.clone(), view.name().to_owned()));
+        if of_pass.next().is_some() {
+            let (process, view) = names();
+            return Err(FrameError::RepeatedItems { process, view });
+        }
+        if first.is_none() && !may_lack_items {
+            let (process, view) = names();
+            return Err(FrameError::MissingItems { process, view });
+        }
+        found.push(first);
     }
     Ok(())
 }
@@ -67,12 +82,18 @@ fn check_items(items: &Items<'_>) -> Result<(), FrameError> {
     if u32::try_from(keys).is_err() {
         return Err(FrameError::TooManyItems { process: process(), count: keys });
     }
+    if !items.data.len().is_multiple_of(ITEM_DATA_ALIGNMENT) {
+        return Err(FrameError::ItemDataSize { process: process(), bytes: items.data.len() });
+    }
     let slices = [("bounds", items.bounds.len()), ("layers", items.layers.len()), ("versions", items.versions.len())];
     match slices.into_iter().find(|(_, count)| *count != 0 && *count != keys) {
         Some((slice, count)) => Err(FrameError::UnequalItems { process: process(), slice, count, keys }),
         None => Ok(()),
     }
 }
+
+/// wgpu copies as many bytes as are a multiple of this.
+const ITEM_DATA_ALIGNMENT: usize = 4;
 
 /// What a frame can hold of its scene, as the object table asks for it.
 #[derive(Debug, Default)]

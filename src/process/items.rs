@@ -2,16 +2,17 @@
 
 #[cfg(feature = "wgpu")]
 use std::error::Error;
+#[cfg(feature = "wgpu")]
+use std::sync::OnceLock;
 
 #[cfg(feature = "wgpu")]
 use wgpu::util::RenderEncoder;
 
 #[cfg(feature = "wgpu")]
 use super::RawPassResources;
-use crate::scene::{Changes, LayerMask};
-#[cfg(feature = "wgpu")]
-use crate::view::RenderView;
-use crate::view::{BoundingSphere, ItemColumns};
+use super::plan::ProcessId;
+use crate::scene::{Changes, LayerMask, ViewKind};
+use crate::view::{BoundingSphere, ItemColumns, RenderView};
 
 /// Items that the engine lends with each frame, and records itself.
 ///
@@ -46,7 +47,7 @@ pub enum ItemOrder {
 ///     ClearColor, Declare, Draws, Format, ItemContext, ItemDraws, ItemRange, ItemRecorder, Items, RecordItems,
 ///     RenderProcess,
 /// };
-/// use drawloom::scene::{Changes, SceneRef};
+/// use drawloom::scene::SceneRef;
 /// use drawloom::view::BoundingSphere;
 /// use drawloom::wgpu::util::RenderEncoder;
 /// use drawloom::{FrameInputs, wgpu};
@@ -100,15 +101,7 @@ pub enum ItemOrder {
 /// impl Forest {
 ///     /// What the renderer gets for a frame: `renderer.record_with(FrameInputs { scene, nodes: &[], items: &[trees] })`.
 ///     fn lend(&self) -> Items<'_> {
-///         Items {
-///             process: "trees",
-///             keys: &self.materials,
-///             bounds: &self.bounds,
-///             layers: &[],
-///             versions: &[],
-///             changes: Changes::Unknown,
-///             recorder: ItemRecorder::Any(self),
-///         }
+///         Items { bounds: &self.bounds, ..Items::new("trees", &self.materials, ItemRecorder::Any(self)) }
 ///     }
 /// }
 /// # }
@@ -117,6 +110,8 @@ pub enum ItemOrder {
 pub struct Items<'a> {
     /// The name of the process that draws them.
     pub process: &'a str,
+    /// The views in which it draws them. Each view of the process has the items of one set.
+    pub views: ItemViews<'a>,
     /// A key for each item, whose meaning is the engine's own: [`ItemOrder::ByKey`] orders by it, and [runs](ItemRange::runs)
     /// have one key. An engine puts into its high bits what is dearest to change, such as the pipeline.
     pub keys: &'a [u64],
@@ -127,19 +122,101 @@ pub struct Items<'a> {
     /// [layers](crate::scene::Camera::layers). Empty if every item belongs to all.
     pub layers: &'a [LayerMask],
     /// A version of each item: items with the version that they had in an earlier frame are recorded to the same
-    /// commands, with the same buffers, bind groups and pipelines; these may have other contents. Bundles of such items
-    /// are kept. Empty if nothing is known about that: then all are recorded in every frame.
+    /// commands, with the same buffers, bind groups and pipelines; these, and [`Items::data`], may have other contents.
+    /// Bundles of such items are kept. Empty if nothing is known about that: then all are recorded in every frame.
     pub versions: &'a [u64],
     /// Which items have another entry in one of these slices than in the [`Items`] that the same renderer was given for
     /// this process last, as for the [objects of a scene](crate::scene::SceneRef::changes). If it is
     /// [`Changes::Unknown`], all are compared.
     pub changes: Changes<'a>,
+    /// Bytes of the engine's own for this frame, which its shaders read from [`ItemContext::data`]: transforms, instances
+    /// of each item, uniforms. A multiple of 4; where shaders bind parts of it, these begin where the device's limits
+    /// allow. What changed since an earlier frame is uploaded.
+    pub data: &'a [u8],
     /// The code that records them.
     #[cfg(feature = "wgpu")]
     pub recorder: ItemRecorder<'a>,
 }
 
+/// The views for which a set of [`Items`] is lent.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum ItemViews<'a> {
+    /// All views of the process.
+    #[default]
+    All,
+    /// Those of a kind.
+    OfKind(ViewKind),
+    /// The view of this name, which is its [camera's](crate::scene::Camera::name).
+    Named(&'a str),
+}
+
+impl ItemViews<'_> {
+    pub(crate) fn contains(self, view: &RenderView) -> bool {
+        match self {
+            Self::All => true,
+            Self::OfKind(kind) => view.kind() == kind,
+            Self::Named(name) => view.name() == name,
+        }
+    }
+}
+
+/// What a set of items is known by from frame to frame.
+#[derive(Debug)]
+pub(crate) struct ItemSetId {
+    process: ProcessId,
+    views: SetViews,
+}
+
+/// [`ItemViews`] with a name of its own.
+#[derive(Debug)]
+enum SetViews {
+    All,
+    OfKind(ViewKind),
+    Named(String),
+}
+
+impl ItemSetId {
+    /// Makes `id` that of the set for these views of a process. Returns false if it is that already.
+    pub(crate) fn replace(id: &mut Option<Self>, process: ProcessId, views: ItemViews<'_>) -> bool {
+        let is_same = |id: &Self| id.process == process && id.views() == views;
+        if id.as_ref().is_some_and(is_same) {
+            return false;
+        }
+        let views = match views {
+            ItemViews::All => SetViews::All,
+            ItemViews::OfKind(kind) => SetViews::OfKind(kind),
+            ItemViews::Named(name) => SetViews::Named(name.to_owned()),
+        };
+        *id = Some(Self { process, views });
+        true
+    }
+
+    fn views(&self) -> ItemViews<'_> {
+        match &self.views {
+            SetViews::All => ItemViews::All,
+            SetViews::OfKind(kind) => ItemViews::OfKind(*kind),
+            SetViews::Named(name) => ItemViews::Named(name),
+        }
+    }
+}
+
 impl<'a> Items<'a> {
+    /// Items with these keys, which every view of the process sees, in all layers, and of which nothing else is known.
+    pub fn new(process: &'a str, keys: &'a [u64], #[cfg(feature = "wgpu")] recorder: ItemRecorder<'a>) -> Self {
+        Self {
+            process,
+            views: ItemViews::All,
+            keys,
+            bounds: &[],
+            layers: &[],
+            versions: &[],
+            changes: Changes::Unknown,
+            data: &[],
+            #[cfg(feature = "wgpu")]
+            recorder,
+        }
+    }
+
     pub(crate) fn columns(&self) -> ItemColumns<'a> {
         let Self { keys, bounds, layers, versions, changes, .. } = *self;
         ItemColumns { keys, bounds, layers, versions, changes }
@@ -164,7 +241,7 @@ pub trait RecordItems: Sync {
     /// executed in draw order.
     ///
     /// A range begins without pipeline, bind groups and buffers. The attachments are those that the process declares,
-    /// in order.
+    /// in order. Memory that the code works with may be in a `thread_local!`: workers live as long as the scheduler.
     ///
     /// # Errors
     /// Any error of the engine. The frame fails, with an error that names process, view and range.
@@ -200,6 +277,37 @@ pub struct ItemContext<'a> {
     /// The device, the view's index, and what the process declares: its targets, buffers and columns. The bind groups are
     /// those of the [prelude](super::SHADER_PRELUDE), for shaders that use it.
     pub resources: RawPassResources<'a>,
+    /// The formats of the colour attachments, in the order in which the process declares them, for the engine's
+    /// pipelines.
+    pub color_formats: &'a [Option<wgpu::TextureFormat>],
+    /// The format of the attachment of depth and stencil, if the process declares one.
+    pub depth_format: Option<wgpu::TextureFormat>,
+    /// The number of samples of all attachments.
+    pub sample_count: u32,
+    /// The buffer with [`Items::data`] and the usages `UNIFORM`, `STORAGE`, `VERTEX` and `INDEX`, which may be longer;
+    /// `None` if there are no data. Frames in flight have buffers of their own.
+    pub data: Option<&'a wgpu::Buffer>,
+    pub(crate) bind_groups: &'a ItemBindGroups,
+}
+
+/// Bind groups of the engine's that refer to a buffer of [`Items::data`].
+#[cfg(feature = "wgpu")]
+pub(crate) type ItemBindGroups = [OnceLock<wgpu::BindGroup>; ItemContext::MAX_BIND_GROUPS];
+
+#[cfg(feature = "wgpu")]
+impl ItemContext<'_> {
+    /// The number of bind groups that a set of items can have for its [data](Self::data).
+    pub const MAX_BIND_GROUPS: usize = 8;
+
+    /// A bind group of the engine's with [`ItemContext::data`]. `make` makes it when it is asked for first, and again
+    /// when the data has another buffer: in each frame in flight, and when it grows. Everything else that the bind group
+    /// refers to stays the same, or has another index.
+    ///
+    /// # Panics
+    /// If the index is not less than [`Self::MAX_BIND_GROUPS`].
+    pub fn bind_group(&self, index: usize, make: impl FnOnce() -> wgpu::BindGroup) -> &wgpu::BindGroup {
+        self.bind_groups[index].get_or_init(make)
+    }
 }
 
 /// A range of the items that a pass draws, in draw order.

@@ -65,8 +65,11 @@ pub use face_culling::FaceCulling;
 pub use format::Format;
 pub use injection_point::InjectionPoint;
 #[cfg(feature = "wgpu")]
+pub(crate) use items::ItemBindGroups;
+pub(crate) use items::ItemSetId;
+#[cfg(feature = "wgpu")]
 pub use items::{ItemContext, ItemRecorder, RecordItems, RecordItemsInPass};
-pub use items::{ItemDraws, ItemOrder, ItemRange, Items};
+pub use items::{ItemDraws, ItemOrder, ItemRange, ItemViews, Items};
 pub use parameters::Parameters;
 pub use pipeline::{DeviceSupport, Pipeline, PipelineProcesses};
 pub use pipeline_state::{ColorMask, DepthBias, PipelineState};

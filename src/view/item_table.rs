@@ -40,6 +40,8 @@ pub(crate) struct ItemTable {
     versions: Vec<u64>,
     /// Whether the table has the columns that were lent last.
     is_current: bool,
+    /// The version of the frame that began with this set of items.
+    set: Version,
     /// The version of what this frame changes.
     frame: Version,
     /// The versions of the order, and of the items' keys and versions.
@@ -80,6 +82,12 @@ impl ItemTable {
     /// The number of ranks in a block.
     pub(crate) const BLOCK_SIZE: usize = ItemList::BLOCK_SIZE;
     const WORDS: usize = Self::BLOCK_SIZE / BITS_PER_WORD;
+
+    /// Makes it the table of another set of items from this frame on.
+    pub(crate) fn begin_set(&mut self, frame: Version) {
+        self.set = frame;
+        self.invalidate();
+    }
 
     /// Makes the next frame find out itself what changed.
     pub(crate) fn invalidate(&mut self) {
@@ -312,7 +320,7 @@ impl ItemTable {
     /// it is that already. Every list of a frame has another index.
     pub(crate) fn list(&self, visible: &ItemVisibility, per_bundle: Option<usize>, index: usize, list: &mut ItemList) {
         let version = Version { index, ..self.frame };
-        list.contents_version = self.contents_version;
+        (list.set, list.contents_version) = (self.set, self.contents_version);
         let changes = ListChanges {
             // Relaxed: all blocks have been culled.
             seen: (!visible.is_resized).then(|| visible.changed.load(Ordering::Relaxed)),
@@ -363,8 +371,8 @@ fn intersecting(frustum: &Frustum, spheres: &BoundingSpheres, first: usize, cull
 #[derive(Debug, Default)]
 pub(crate) struct ItemVisibility {
     blocks: Vec<RwLock<BlockVisibility>>,
-    /// The view's frustum, and whether it culls.
-    tested_with: Option<(Frustum, bool)>,
+    /// The view's frustum and layers, and whether it culls.
+    tested_with: Option<(Frustum, LayerMask, bool)>,
     /// How many ranks come into view or leave it in this frame.
     changed: AtomicUsize,
     /// Whether the number of blocks is another one than in the frame before.
@@ -386,9 +394,12 @@ impl ItemVisibility {
         *self.changed.get_mut() = 0;
         self.is_resized = self.blocks.len() != table.block_count();
         self.blocks.resize_with(table.block_count(), RwLock::default);
-        let is_same = self.tested_with.as_ref().is_some_and(|(frustum, had)| (frustum, *had) == (&view.frustum, culls));
-        if !is_same {
-            self.tested_with = Some((view.frustum.clone(), culls));
+        let layers = view.camera.layers;
+        let is_same = |(frustum, had_layers, culled): &(Frustum, LayerMask, bool)| {
+            (frustum, *had_layers, *culled) == (&view.frustum, layers, culls)
+        };
+        if !self.tested_with.as_ref().is_some_and(is_same) {
+            self.tested_with = Some((view.frustum.clone(), layers, culls));
             self.blocks.iter_mut().for_each(|block| block.get_mut().tested = Version::default());
         }
     }
@@ -481,7 +492,7 @@ mod tests {
         #[test]
         fn lists_have_what_a_loop_over_all_items_finds(
             frames in prop::collection::vec(
-                (0..14, 0_usize..2_000, 0_u64..4, 1_usize..600, any::<u64>(), 0_usize..2_000),
+                (0..15, 0_usize..2_000, 0_u64..4, 1_usize..600, any::<u64>(), 0_usize..2_000),
                 1..16,
             ),
             spheres in prop::collection::vec(any_sphere(), 2_000),
@@ -490,9 +501,9 @@ mod tests {
             is_small: bool,
         ) {
             let (mut kept, mut told) = (Kept::default(), Kept::default());
-            let camera = |turns| {
+            let camera = |turns, layer| {
                 let target = if turns { DVec3::new(0.5, 0.0, -1.0) } else { DVec3::NEG_Z };
-                Camera { layers: LayerMask::layer(3), ..Camera::looking_at("main", DVec3::ZERO, target) }
+                Camera { layers: LayerMask::layer(layer), ..Camera::looking_at("main", DVec3::ZERO, target) }
             };
             let is_invalid =
                 |sphere: &BoundingSphere| !sphere.center.is_finite() || sphere.radius.is_nan() || sphere.radius < 0.0;
@@ -511,7 +522,7 @@ mod tests {
             let mut layers: Vec<_> = layers.iter().map(|own| LayerMask::layer(if *own { 3 } else { 4 })).collect();
             let (mut count, mut key_bits, mut per_bundle, mut seed) = (1_000, 2, None, 0);
             let (mut sorts, mut has_bounds, mut has_layers, mut turns) = (true, true, false, false);
-            let (mut changed_key, mut versions) = (0, vec![0; 2_000]);
+            let (mut changed_key, mut versions, mut layer) = (0, vec![0; 2_000], 3);
             let mut before: Option<OwnColumns> = None;
             for (changed, new_count, new_bits, new_per_bundle, new_seed, moved) in frames {
                 match changed {
@@ -530,9 +541,10 @@ mod tests {
                     12 => changed_key = moved,
                     // A frame that fails before it begins.
                     13 => told.table.invalidate(),
+                    14 => layer = 7 - layer,
                     _ => {}
                 }
-                let view = RenderView::new(&camera(turns));
+                let view = RenderView::new(&camera(turns, layer));
                 let key = |item: usize| {
                     let hash = (item as u64 ^ seed).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> (64 - 1 - key_bits);
                     hash ^ u64::from(item == changed_key)
@@ -655,7 +667,8 @@ mod tests {
         assert_eq!(frames(1, (1, 0), None), (25, 0), "it may go on resting");
         // One of 100 goes.
         assert_eq!(frames(5, (256, 0), None), (800, 1));
-        assert_eq!(frames(1, (0, 0), Some(100)), (244, 0));
+        assert_eq!(frames(1, (0, 0), Some(100)), (244, 1));
+        assert_eq!(frames(1, (0, 0), None), (800, 1), "groups as before");
         assert_eq!(frames(100, (0, 0), None), (25, 1));
         // One of 100 has a new version.
         assert_eq!(frames(5, (0, 1024), None), (800, 1));

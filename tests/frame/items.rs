@@ -6,10 +6,10 @@ use std::sync::Arc;
 use drawloom::backend::NullBackend;
 use drawloom::glam::DVec3;
 use drawloom::process::{
-    Declare, Draws, Format, ItemContext, ItemDraws, ItemOrder, ItemRange, ItemRecorder, Items, RecordItems,
+    Declare, Draws, Format, ItemContext, ItemDraws, ItemOrder, ItemRange, ItemRecorder, ItemViews, Items, RecordItems,
     RenderProcess,
 };
-use drawloom::scene::{Assets, Camera, Changes, LayerMask, SceneRef};
+use drawloom::scene::{Assets, Camera, Changes, LayerMask, SceneRef, ViewKind};
 use drawloom::task::Scheduler;
 use drawloom::view::internal::Frustum;
 use drawloom::view::{BoundingSphere, IssueReason};
@@ -53,15 +53,7 @@ impl RecordItems for Never {
 }
 
 fn items<'a>(process: &'a str, keys: &'a [u64]) -> Items<'a> {
-    Items {
-        process,
-        keys,
-        bounds: &[],
-        layers: &[],
-        versions: &[],
-        changes: Changes::Unknown,
-        recorder: ItemRecorder::Any(&Never),
-    }
+    Items::new(process, keys, ItemRecorder::Any(&Never))
 }
 
 fn renderer(workers: usize, granularity: Granularity) -> (Renderer<NullBackend>, Submitter<NullBackend>) {
@@ -207,6 +199,45 @@ fn what_changed_counts_from_the_items_lent_last_for_the_process_even_if_that_fra
 }
 
 #[test]
+fn views_have_items_of_their_own() {
+    let (mut renderer, _) = renderer(2, Granularity::Adaptive);
+    let (assets, cameras) = (Assets::default(), cameras());
+    let scene = SceneRef { cameras: &cameras, ..SceneRef::new(&assets) };
+    let as_lent = items("as lent", &[0; 4]);
+    let own = |views, keys| Items { views, ..items("sorted", keys) };
+    let mut draw = |sets: &[Items<'_>]| {
+        let lent: Vec<_> = sets.iter().copied().chain([as_lent]).collect();
+        drop(renderer.record_with(FrameInputs { items: &lent, ..FrameInputs::new(scene) }).unwrap());
+        let of = |process| [0, 1].map(|view| list(&renderer, process, view));
+        assert_eq!(of("as lent"), [[0, 1, 2, 3]; 2]);
+        of("sorted")
+    };
+    let (named, of_kind) = (ItemViews::Named("one"), ItemViews::OfKind(ViewKind::Main));
+    let [first, second] = [own(named, &[2, 1, 3]), own(ItemViews::Named("other"), &[5, 4])];
+    let nobodys = [ItemViews::Named("nobody"), ItemViews::OfKind(ViewKind::Shadow)].map(|views| own(views, &[1]));
+    assert_eq!(draw(&[first, second]), [vec![1, 0, 2], vec![1, 0]]);
+    assert_eq!(draw(&[second, nobodys[0], nobodys[1], first]), [vec![1, 0, 2], vec![1, 0]], "in another order");
+    assert_eq!(draw(&[own(of_kind, &[9, 8])]), [[1, 0], [1, 0]]);
+    assert_eq!(draw(&[own(ItemViews::All, &[9, 8, 7])]), [[2, 1, 0], [2, 1, 0]]);
+    assert_eq!(draw(&[first, second]), [vec![1, 0, 2], vec![1, 0]], "as before");
+}
+
+#[test]
+fn a_view_whose_layers_change_sees_other_items() {
+    let (mut renderer, _) = renderer(1, Granularity::Adaptive);
+    let (assets, [mut camera, _]) = (Assets::default(), cameras());
+    let layers = [LayerMask::layer(0), LayerMask::layer(1), LayerMask::ALL];
+    let lent = ["sorted", "as lent"].map(|process| Items { layers: &layers, ..items(process, &[0; 3]) });
+    for (layer, expected) in [(0, [0, 2]), (1, [1, 2]), (0, [0, 2])] {
+        camera.layers = LayerMask::layer(layer);
+        let cameras = [camera.clone()];
+        let scene = SceneRef { cameras: &cameras, ..SceneRef::new(&assets) };
+        drop(renderer.record_with(FrameInputs { items: &lent, ..FrameInputs::new(scene) }).unwrap());
+        assert_eq!(list(&renderer, "sorted", 0), expected);
+    }
+}
+
+#[test]
 fn items_that_do_not_fit_the_processes_are_refused_by_name_and_the_next_frame_is_right() {
     let (mut renderer, _) = renderer(2, Granularity::Adaptive);
     let (assets, cameras) = (Assets::default(), cameras());
@@ -215,8 +246,20 @@ fn items_that_do_not_fit_the_processes_are_refused_by_name_and_the_next_frame_is
     let one_sphere = [BoundingSphere { center: DVec3::ZERO, radius: 1.0 }];
     let two_layers = [LayerMask::ALL; 2];
     let cases = [
-        (vec![sorted], "process \"as lent\" draws items, and none are lent for it"),
-        (vec![sorted, as_lent, sorted], "two sets of items are lent for process \"sorted\""),
+        (vec![sorted], "process \"as lent\" draws items in view \"one\", and none are lent for it"),
+        (vec![sorted, as_lent, sorted], "two sets of items are lent for process \"sorted\" in view \"one\""),
+        (
+            vec![as_lent, Items { views: ItemViews::Named("other"), ..sorted }],
+            "process \"sorted\" draws items in view \"one\", and none are lent for it",
+        ),
+        (
+            vec![as_lent, sorted, Items { views: ItemViews::Named("other"), ..sorted }],
+            "two sets of items are lent for process \"sorted\" in view \"other\"",
+        ),
+        (
+            vec![as_lent, Items { data: &[0; 6], ..sorted }],
+            "the items of process \"sorted\" have 6 bytes of data, which is not a multiple of 4",
+        ),
         (
             vec![Items { bounds: &one_sphere, ..sorted }, as_lent],
             "the items of process \"sorted\" have 3 keys but 1 bounds",

@@ -46,7 +46,7 @@ fn broken_rule(calls: impl FnOnce(&NullFrame, &DrawList, &FrameRequest<'_>) -> R
         sampled_views: &SampledViews::default(),
         scene: &scene.as_scene_ref(),
         items: &[],
-        items_of_process: &[],
+        items_of_passes: &[],
         objects: &objects,
         list_capacity: objects.len(),
         generated: &[],

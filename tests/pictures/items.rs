@@ -9,7 +9,7 @@ use drawloom::process::{
     ClearColor, Declare, Draws, Format, ItemContext, ItemDraws, ItemOrder, ItemRange, ItemRecorder, Items, RecordItems,
     RecordItemsInPass, RenderProcess,
 };
-use drawloom::scene::{Assets, Camera, Changes, SceneRef};
+use drawloom::scene::{Assets, Camera, SceneRef};
 use drawloom::task::Scheduler;
 use drawloom::view::BoundingSphere;
 use drawloom::wgpu::util::RenderEncoder;
@@ -183,7 +183,7 @@ impl World {
 
     fn items<'a>(&'a self, recorder: ItemRecorder<'a>) -> Items<'a> {
         let Self { keys, bounds, versions, .. } = self;
-        Items { process: "squares", keys, bounds, layers: &[], versions, changes: Changes::Unknown, recorder }
+        Items { bounds, versions, ..Items::new("squares", keys, recorder) }
     }
 }
 

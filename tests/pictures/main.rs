@@ -31,6 +31,8 @@ mod geometry;
 mod history;
 mod image_distance;
 mod imported_targets;
+mod item_data;
+mod item_faults;
 mod items;
 mod kept_processes;
 mod large_lists;
@@ -113,6 +115,8 @@ fn main() {
         (geometry::CASES, Needs::Adapter),
         (history::CASES, Needs::Adapter),
         (imported_targets::CASES, Needs::Adapter),
+        (item_data::CASES, Needs::Adapter),
+        (item_faults::CASES, Needs::Adapter),
         (items::CASES, Needs::Adapter),
         (kept_processes::CASES, Needs::Adapter),
         (large_lists::CASES, Needs::Adapter),

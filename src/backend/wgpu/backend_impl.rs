@@ -226,10 +226,9 @@ impl FrameRecorder for WgpuBackend {
         let (pipelines, pass) = (frame.pipelines(pass), frame.pass(index));
         pass.timing.set_size(list.draw_count(), list.bundle_count(), pass.strategy.part_count(list));
         if pass.draws_items {
-            let (slots, group_size) = (list.items.slot_count(), list.items.group_size());
-            pass.timing.set_group_size(group_size);
+            pass.timing.set_group_size(list.items.group_size());
             let caches_bundles = pass.strategy.recording == RecordingStrategy::CachedBundles;
-            if caches_bundles && pass.bundle_cache.begin_items(slots, group_size) {
+            if caches_bundles && pass.bundle_cache.begin_items(&list.items) {
                 pass.timing.set_cold();
             }
             return Ok(());

@@ -144,13 +144,13 @@ impl WgpuBackend {
         let (strategies, mut may_try) = (self.strategies.strategies(), true);
         let WgpuFrame { number, pipelines, meshes, targets, storage_buffers, buffers, .. } = frame;
         let (passes, resources) = buffers.passes_mut();
-        for pass in passes {
+        for (index_of_pass, pass) in passes.iter_mut().enumerate() {
             let Pass { process_index: process, view_index: view } = pass.pass;
             let pipelines = &pipelines[process];
             self.update_bind_groups(request, pipelines, targets, storage_buffers, &resources, pass)?;
 
             let (mut index, mut is_trial) = (0, false);
-            let lent = request.items_of(process).filter(|_| pass.draws_items);
+            let lent = request.items_of(index_of_pass);
             let into_passes = lent.is_some_and(|items| matches!(items.recorder, ItemRecorder::Pass(_)));
             let fixed = into_passes.then(|| self.strategies.of_passes_alone(request.passes.len() < request.workers));
             pass.is_tuned = pass.has_list() && fixed.is_none();
@@ -174,6 +174,8 @@ impl WgpuBackend {
                     materials_bind_groups: Arc::clone(resources.materials_bind_groups),
                     process_bind_group: pass.process_bind_group.as_ref().map(|process| process.group.clone()),
                     engine_bind_group: pass.engine_bind_group.as_ref().map(|columns| columns.group.clone()),
+                    item_data: request.items_of_passes[index_of_pass]
+                        .and_then(|set| resources.item_data.of_set(set).cloned()),
                     meshes: meshes.number(),
                     pipelines: Arc::clone(pipelines),
                     clamps_depth: pass.clamps_depth,

@@ -144,7 +144,7 @@ impl<B: Backend> FrameContext<'_, B> {
 
     /// The items that a pass draws, in draw order and as the engine lends them; `None` if it draws none.
     pub(in crate::frame) fn items_of(&self, pass: usize) -> Option<(&ItemTable, &Items<'_>)> {
-        let index = self.tables.items_of_process[self.request.passes[pass].process_index]?;
+        let index = self.tables.items_of_passes[pass]?;
         Some((&self.tables.items[index].0, &self.request.items[index]))
     }
 

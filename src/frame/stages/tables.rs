@@ -26,7 +26,7 @@ use crate::frame::static_groups::{ListConditions, StaticGroupTable};
 use crate::frame::views::FrameViews;
 use crate::frame::views::view_visibility::{Retest, ViewVisibility};
 use crate::leaked_guards::unlock;
-use crate::process::{Draws, FramePlan, ItemOrder, Items, Pass, ProcessId};
+use crate::process::{Draws, FramePlan, ItemOrder, ItemSetId, Items, Pass, ProcessId};
 use crate::quality::{CullingVolume, DepthPrecision};
 use crate::scene::{Camera, Projection, SceneError, SceneRef};
 use crate::view::{
@@ -51,10 +51,10 @@ pub(in crate::frame) struct FrameTables {
     pub(in crate::frame) levels: PerView<ViewLevels>,
     /// The lights that reach each view.
     pub(in crate::frame) lights: Vec<LightTable>,
-    /// One for each set of items that the engine lends, and the process that drew them last.
-    pub(in crate::frame) items: Vec<(ItemTable, Option<ProcessId>)>,
-    /// The items of each process, by index; `None` for one that draws none.
-    pub(in crate::frame) items_of_process: Vec<Option<usize>>,
+    /// One for each set of items that the engine lends, and which one it was last.
+    pub(in crate::frame) items: Vec<(ItemTable, Option<ItemSetId>)>,
+    /// The items of each pass, by index; `None` for one that draws none.
+    pub(in crate::frame) items_of_passes: Vec<Option<usize>>,
     /// One for each pass.
     pub(in crate::frame) passes: Vec<PassTable>,
     /// What each of these belongs to, and the passes that these keys were made of: those of a stage graph.
@@ -121,16 +121,18 @@ impl FrameTables {
     ) -> Result<(), FrameError> {
         self.items.resize_with(items.len(), Default::default);
         let frame = self.frames;
-        for (index, ((table, owner), items)) in self.items.iter_mut().zip(items).enumerate() {
+        for (index, ((table, id), items)) in self.items.iter_mut().zip(items).enumerate() {
             let version = Version { frame, index };
-            let process = self.items_of_process.iter().position(|own| *own == Some(index));
+            let pass = self.items_of_passes.iter().position(|own| *own == Some(index));
+            let process = pass.map(|pass| passes[pass].process_index);
             let process = process.map(|process| (&plan.processes()[process], &draws[process]));
             let Some((planned, Draws::Items(draws))) = process else {
+                *id = None;
                 table.begin_frame(&ItemColumns::default(), false, version);
                 continue;
             };
-            if owner.replace(planned.id) != Some(planned.id) {
-                table.invalidate();
+            if ItemSetId::replace(id, planned.id, items.views) {
+                table.begin_set(version);
             }
             table.begin_frame(&items.columns(), draws.order == ItemOrder::ByKey, version);
             if cfg!(debug_assertions)
@@ -139,8 +141,8 @@ impl FrameTables {
                 return Err(FrameError::UnreportedItemChange { process: planned.name.clone(), item });
             }
         }
-        for (pass, table) in passes.iter().zip(&mut self.passes) {
-            if let Some(index) = self.items_of_process[pass.process_index] {
+        for ((pass, table), &index) in passes.iter().zip(&mut self.passes).zip(&self.items_of_passes) {
+            if let Some(index) = index {
                 let culls = volume != CullingVolume::None;
                 table.visible_items.begin_frame(&self.items[index].0, &views[pass.view_index], culls);
             }

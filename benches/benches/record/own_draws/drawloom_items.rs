@@ -48,13 +48,10 @@ impl OwnTechnique for DrawloomItems {
         let upload = UploadNode { commands: &self.commands, world, chunks: Commands::chunk_count(world, self.workers) };
         let nodes: &[&dyn CpuNode] = &[&upload];
         let items = Items {
-            process: OWN_DRAWS,
-            keys: &world.keys,
             bounds: &world.bounds,
-            layers: &[],
             versions: if self.has_versions { &world.versions } else { &[] },
             changes: if world.kind().moves_items() { Changes::Unknown } else { Changes::NONE },
-            recorder: ItemRecorder::Any(&self.commands),
+            ..Items::new(OWN_DRAWS, &world.keys, ItemRecorder::Any(&self.commands))
         };
         let inputs = FrameInputs { nodes, items: &[items], ..FrameInputs::new(world.as_scene_ref()) };
         let submitted = self.submitter.submit(self.renderer.record_with(inputs)?)?;

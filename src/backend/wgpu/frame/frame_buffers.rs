@@ -8,6 +8,7 @@ use std::sync::Arc;
 use parking_lot::{Mutex, RwLock};
 
 use super::allotment::allot;
+use super::item_data::ItemData;
 use super::material_buffer::MaterialBuffer;
 use super::object_buffers::{ObjectBuffers, ObjectLists};
 use super::pass_state::{FrameRanges, PassId, WgpuPassState};
@@ -66,6 +67,7 @@ impl BufferPool {
             sizes.extend(buffers.objects.sizes());
             sizes.extend(buffers.object_lists.sizes());
             sizes.extend(buffers.bytes.sizes());
+            sizes.extend(buffers.item_data.sizes());
             sizes.push(buffers.materials.size());
             sizes.extend(buffers.passes.iter().map(|pass| pass.partial_indices.read().size()));
         }
@@ -177,6 +179,7 @@ impl FrameBuffers {
         let processes = request.plan.processes().iter().zip(request.draws);
         let bytes = processes.map(|(planned, draws)| bytes_of_process(materials, planned, draws));
         buffers.bytes.update(device, uploads, bytes)?;
+        buffers.item_data.update(device, uploads, request)?;
         let lost_lists = buffers.object_lists.reserve(device, lists, listed, request.limits)?;
         reallocated |= lost_lists;
         for mirrored in [&mut buffers.views, &mut buffers.lights] {
@@ -269,9 +272,9 @@ impl FrameBuffers {
 
     /// The passes, and what their bind groups bind.
     pub(crate) fn passes_mut(&mut self) -> (&mut [WgpuPassState], PassResources<'_>) {
-        let Buffers { passes, parameters, objects, materials, bytes, .. } = &mut *self.buffers;
+        let Buffers { passes, parameters, objects, materials, bytes, item_data, .. } = &mut *self.buffers;
         let materials_bind_groups = materials.bind_groups();
-        (passes, PassResources { parameters: &parameters.on_device, objects, bytes, materials_bind_groups })
+        (passes, PassResources { parameters: &parameters.on_device, objects, bytes, item_data, materials_bind_groups })
     }
 
     /// The meshes that the frame draws subdivided.
@@ -287,6 +290,11 @@ impl FrameBuffers {
     /// The bytes of the engine's own that each process reads.
     pub(crate) fn resource_bytes(&self) -> &ResourceBytes {
         &self.buffers.bytes
+    }
+
+    /// The data of items.
+    pub(crate) fn item_data(&self) -> &ItemData {
+        &self.buffers.item_data
     }
 
     /// `@group(1)` for each set of textures; none before the frame begins.
@@ -335,6 +343,7 @@ pub(crate) struct PassResources<'a> {
     pub(crate) parameters: &'a GrowingBuffer,
     pub(crate) objects: &'a ObjectBuffers,
     pub(crate) bytes: &'a ResourceBytes,
+    pub(crate) item_data: &'a ItemData,
     pub(crate) materials_bind_groups: &'a Arc<[wgpu::BindGroup]>,
 }
 
@@ -351,6 +360,7 @@ struct Buffers {
     parameters: MirroredBuffer,
     /// What processes read of the engine's own.
     bytes: ResourceBytes,
+    item_data: ItemData,
     passes: Vec<WgpuPassState>,
     view_ranges: PerView<ViewRanges>,
     subdivided: RwLock<SubdividedMeshes<SubdividedMesh>>,
@@ -372,6 +382,7 @@ impl Buffers {
             object_lists: ObjectLists::new(),
             parameters: MirroredBuffer::new("parameters", BufferUsages::UNIFORM),
             bytes: ResourceBytes::default(),
+            item_data: ItemData::default(),
             passes: Vec::new(),
             view_ranges: PerView::default(),
             subdivided: RwLock::default(),
@@ -616,7 +627,7 @@ mod tests {
             sampled_views: &SampledViews::default(),
             scene: &scene.as_scene_ref(),
             items: &[],
-            items_of_process: &[],
+            items_of_passes: &[],
             objects: &objects,
             list_capacity: 1_000,
             generated: &[],

@@ -2,6 +2,7 @@
 
 mod allotment;
 mod frame_buffers;
+mod item_data;
 mod material_buffer;
 mod object_buffers;
 mod pass_state;

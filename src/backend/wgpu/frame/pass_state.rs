@@ -15,7 +15,7 @@ use crate::backend::subdivision_cache::{CachedSubdivision, SubdividedMeshes, sub
 use crate::backend::wgpu::pipelines::ProcessPipelines;
 use crate::backend::wgpu::resources::{CachedBindGroup, CountedQueue, GrowingBuffer, SubdividedMesh};
 use crate::backend::wgpu::strategy::{EncodingStrategy, PassStrategy, RecordingStrategy};
-use crate::command::{Batch, Version};
+use crate::command::{Batch, ItemList, Version};
 use crate::process::{Draws, FramePlan, Pass, ProcessId};
 use crate::view::{RenderView, ViewId};
 
@@ -256,6 +256,8 @@ pub(crate) struct BundleKey {
     pub(crate) materials_bind_groups: Arc<[wgpu::BindGroup]>,
     pub(crate) process_bind_group: Option<wgpu::BindGroup>,
     pub(crate) engine_bind_group: Option<wgpu::BindGroup>,
+    /// The buffer with the data of its items.
+    pub(crate) item_data: Option<wgpu::Buffer>,
     /// The number of the snapshot. The bundles keep the pages that they draw from, but do not keep them from being
     /// overwritten: they are not replayed with another snapshot.
     pub(crate) meshes: u64,
@@ -270,6 +272,7 @@ impl PartialEq for BundleKey {
             && Arc::ptr_eq(&self.materials_bind_groups, &other.materials_bind_groups)
             && self.process_bind_group == other.process_bind_group
             && self.engine_bind_group == other.engine_bind_group
+            && self.item_data == other.item_data
             && (self.meshes, self.clamps_depth) == (other.meshes, other.clamps_depth)
             && Arc::ptr_eq(&self.pipelines, &other.pipelines)
     }
@@ -290,8 +293,8 @@ pub(crate) struct BundleCache {
 #[derive(Default)]
 struct CachedItemBundles {
     bundles: Vec<Option<CachedItems>>,
-    /// The size of the groups that they draw.
-    group_size: usize,
+    /// The set of items, and the size of the groups that they draw.
+    of: (Version, usize),
     /// Those that this frame replaces. The frames that the device has not drawn yet keep them alive, so the next frame
     /// with these buffers drops them: on workers, and in the time of the pass, which the tuner sees.
     replaced: Vec<wgpu::RenderBundle>,
@@ -348,16 +351,17 @@ impl BundleCache {
         self.bundles.lock().resize_with(bundles, || None);
     }
 
-    /// Makes room for this many bundles of items of groups of this size. Drops those of groups of another size, and
-    /// further ones. Returns whether groups have another size, so that all are recorded anew.
-    pub(crate) fn begin_items(&self, bundles: usize, group_size: usize) -> bool {
-        let CachedItemBundles { bundles: cached, group_size: before, .. } = &mut *self.of_items.lock();
-        let has_other_size = mem::replace(before, group_size) != group_size;
-        if has_other_size {
-            cached.clear();
+    /// Makes room for the bundles of a list. Drops further ones, and all if they are of another set of items, or of
+    /// groups of another size. Returns whether it drops all.
+    pub(crate) fn begin_items(&self, list: &ItemList) -> bool {
+        let CachedItemBundles { bundles, of: before, .. } = &mut *self.of_items.lock();
+        let of = (list.set, list.group_size());
+        let drops_all = mem::replace(before, of) != of;
+        if drops_all {
+            bundles.clear();
         }
-        cached.resize_with(bundles, || None);
-        has_other_size
+        bundles.resize_with(list.slot_count(), || None);
+        drops_all
     }
 
     /// The bundle of items at an index, with its digest, if it draws these, of a list of these versions: each with its
@@ -368,15 +372,17 @@ impl BundleCache {
         list: [Version; 2],
         items: impl Iterator<Item = (u32, u64, u64)>,
     ) -> Option<(wgpu::RenderBundle, u64)> {
-        let mut of_items = self.of_items.lock();
-        let cached = of_items.bundles.get_mut(index)?.as_mut()?;
-        if cached.list != list {
-            if !items.eq(cached.items.iter().copied()) {
-                return None;
-            }
+        // Workers compare at the same time. A frame has one job for each bundle.
+        let mut cached = self.of_items.lock().bundles.get_mut(index)?.take()?;
+        let is_same = cached.list == list || items.eq(cached.items.iter().copied());
+        if is_same {
             cached.list = list;
         }
-        Some((cached.bundle.clone(), cached.digest))
+        let found = is_same.then(|| (cached.bundle.clone(), cached.digest));
+        if let Some(slot) = self.of_items.lock().bundles.get_mut(index) {
+            *slot = Some(cached);
+        }
+        found
     }
 
     /// Replaces the bundle of items at an index.
@@ -387,19 +393,18 @@ impl BundleCache {
         items: impl Iterator<Item = (u32, u64, u64)>,
         (bundle, digest): (wgpu::RenderBundle, u64),
     ) {
-        let mut of_items = self.of_items.lock();
-        let CachedItemBundles { bundles, replaced, unused, .. } = &mut *of_items;
-        let Some(slot) = bundles.get_mut(index) else { return };
-        let mut cached = Vec::new();
-        if let Some(before) = slot.take() {
-            cached = before.items;
-            replaced.push(before.bundle);
-        }
+        let before = self.of_items.lock().bundles.get_mut(index).and_then(Option::take);
+        let (mut cached, replaced) = before.map_or_else(Default::default, |before| (before.items, Some(before.bundle)));
         cached.clear();
         cached.extend(items);
-        *slot = Some(CachedItems { items: cached, list, bundle, digest });
-        let unused = [unused.pop(), unused.pop()];
-        drop(of_items);
+        let unused = {
+            let of_items = &mut *self.of_items.lock();
+            of_items.replaced.extend(replaced);
+            if let Some(slot) = of_items.bundles.get_mut(index) {
+                *slot = Some(CachedItems { items: cached, list, bundle, digest });
+            }
+            [of_items.unused.pop(), of_items.unused.pop()]
+        };
         drop(unused);
     }
 
@@ -607,6 +612,7 @@ mod tests {
             materials_bind_groups: [bind_group(device)].into(),
             process_bind_group: None,
             engine_bind_group: None,
+            item_data: None,
             meshes: 1,
             pipelines: pipelines(device),
             clamps_depth: false,

@@ -26,12 +26,14 @@ impl PassEncoder<'_> {
             Some(last) => list.bundle_range(bundles.start).start..list.bundle_range(last).end,
             None => 0..0,
         };
+        if range.is_empty() {
+            // The frames of a warm-up have no items.
+            self.begin(encoder, segment)?;
+            return Ok(());
+        }
         let lent = self.lent_items()?;
         self.with_context(|context| {
             let mut pass = self.begin(encoder, segment)?;
-            if range.is_empty() {
-                return Ok(());
-            }
             match lent.recorder {
                 ItemRecorder::Any(recorder) => self.call(range, |items| recorder.record(&mut pass, items, context)),
                 ItemRecorder::Pass(recorder) => self.call(range, |items| recorder.record(&mut pass, items, context)),

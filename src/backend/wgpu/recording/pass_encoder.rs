@@ -7,8 +7,8 @@ use crate::backend::wgpu::strategy::{PassSegment, RecordingStrategy};
 use crate::backend::{BackendError, FrameRequest, PassRequest};
 use crate::command::DrawList;
 use crate::process::{
-    BufferLayout, ClearColor, ComputeDispatch, DrawCount, Draws, ItemContext, Items, PlannedProcess, ProceduralDraws,
-    RawAccess, RawPass, RawPassResources, Workgroups,
+    BufferLayout, ClearColor, ComputeDispatch, DrawCount, Draws, ItemBindGroups, ItemContext, Items, PlannedProcess,
+    ProceduralDraws, RawAccess, RawPass, RawPassResources, Workgroups,
 };
 
 /// No device supports more colour attachments.
@@ -242,7 +242,18 @@ impl<'a> PassEncoder<'a> {
             textures: &textures,
             layered: &layered,
         };
-        let context = ItemContext { view, resources };
+        let set = self.request.items_of_passes.get(self.index).copied().flatten();
+        let item_data = frame.buffers.item_data();
+        let (attachments, none) = (self.pipelines.bundle_descriptor(&self.state.label), ItemBindGroups::default());
+        let context = ItemContext {
+            view,
+            resources,
+            color_formats: attachments.color_formats,
+            depth_format: attachments.depth_stencil.map(|depth_stencil| depth_stencil.format),
+            sample_count: attachments.sample_count,
+            data: set.and_then(|set| item_data.of_set(set)),
+            bind_groups: set.and_then(|set| item_data.bind_groups_of_set(set)).unwrap_or(&none),
+        };
         let result = call(&context);
         // Before the code's own error, which may follow from it, and even if there is none: code that goes on without a
         // resource draws something else than its process promises.
