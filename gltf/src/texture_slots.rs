@@ -1,7 +1,7 @@
 //! Textures of materials: which image, how it is placed, filtered and wrapped.
 
 use drawloom::glam::{Mat2, Vec2};
-use drawloom::scene::{Filter, Outside, Sampler};
+use drawloom::scene::{AddressMode, Filter, Sampler};
 
 use crate::document::Source;
 use crate::element::{Element, Kind};
@@ -48,9 +48,9 @@ impl SlotReader<'_> {
         let read = self.source.member(texture, "sampler", Kind::Sampler);
         let lost = format_args!("{texture} is drawn with the default sampler");
         let Some(sampler) = self.warnings.keep(read, lost)?.flatten() else { return Ok(Sampler::REPEAT) };
-        let magnified = self.choose(&sampler, "magFilter", &[(9728, Filter::Nearest), (9729, Filter::Linear)])?;
+        let mag_filter = self.choose(&sampler, "magFilter", &[(9728, Filter::Nearest), (9729, Filter::Linear)])?;
         let [nearest, linear] = [Filter::Nearest, Filter::Linear];
-        let reduced = [
+        let min_filters = [
             (9728, (nearest, None)),
             (9729, (linear, None)),
             (9984, (nearest, Some(nearest))),
@@ -58,18 +58,18 @@ impl SlotReader<'_> {
             (9986, (nearest, Some(linear))),
             (9987, (linear, Some(linear))),
         ];
-        let reduced = self.choose(&sampler, "minFilter", &reduced)?;
-        let outside = [(10497, Outside::Repeat), (33071, Outside::Clamp), (33648, Outside::Mirror)];
-        let [across, down] = [self.choose(&sampler, "wrapS", &outside)?, self.choose(&sampler, "wrapT", &outside)?];
-        let magnified = magnified.unwrap_or_default();
+        let min_filter = self.choose(&sampler, "minFilter", &min_filters)?;
+        let modes = [(10497, AddressMode::Repeat), (33071, AddressMode::Clamp), (33648, AddressMode::Mirror)];
+        let [across, down] = [self.choose(&sampler, "wrapS", &modes)?, self.choose(&sampler, "wrapT", &modes)?];
+        let mag_filter = mag_filter.unwrap_or_default();
         // Where the file leaves the choice, texels that are nearest in one direction are so in the other.
         let is_free = sampler.json.get("minFilter").is_none();
-        let (reduced, levels) = match reduced {
-            None if is_free => (magnified, Some(linear)),
-            reduced => reduced.unwrap_or((linear, Some(linear))),
+        let (min_filter, mip_filter) = match min_filter {
+            None if is_free => (mag_filter, Some(linear)),
+            chosen => chosen.unwrap_or((linear, Some(linear))),
         };
-        let outside = [across.unwrap_or_default(), down.unwrap_or_default()];
-        Ok(Sampler { outside, magnified, reduced, levels, anisotropy: 1 })
+        let address_modes = [across.unwrap_or_default(), down.unwrap_or_default()];
+        Ok(Sampler { address_modes, mag_filter, min_filter, mip_filter, anisotropy: 1 })
     }
 
     /// What a member of a sampler chooses; `None` for the default.

@@ -7,7 +7,9 @@ use wgpu::util::DeviceExt;
 
 use super::raw_access::RawAccess;
 use super::{AccessError, BufferLayout, StorageBuffer};
-use crate::scene::{ColumnLayout, MaterialLayout, MaterialType, ObjectColumn, ViewKind};
+use crate::handle::Handle;
+use crate::scene::{ColumnLayout, Material, MaterialLayout, MaterialType, ObjectColumn, ViewKind};
+use crate::view::TextureSets;
 
 /// A pass that gets the command encoder, because compute, copies and viewports cannot be recorded into a bundle.
 ///
@@ -49,8 +51,12 @@ pub struct RawPassResources<'a> {
     /// The layouts of [`RawPassResources::bind_groups`], for pipelines of the pass's own.
     pub bind_group_layouts: [&'a wgpu::BindGroupLayout; 2],
     /// `@group(0)` and `@group(1)` of the [prelude](super::SHADER_PRELUDE), for vertex, fragment and compute shaders:
-    /// the view, all objects and the lights that reach the view; materials and their textures. `drawn` is empty.
+    /// the view, all objects and the lights that reach the view; materials and their textures. `drawn` is empty. Where
+    /// textures of materials are divided into sets, the second has the first of them: see
+    /// [`Self::bind_group_of_material`].
     pub bind_groups: [&'a wgpu::BindGroup; 2],
+    pub(crate) materials_bind_groups: &'a [wgpu::BindGroup],
+    pub(crate) texture_sets: &'a TextureSets,
     pub(crate) access: RawAccess<'a>,
     pub(crate) columns: &'a dyn Fn(ColumnLayout) -> Option<wgpu::BufferBinding<'a>>,
     pub(crate) materials: &'a dyn Fn(MaterialLayout) -> Option<wgpu::BufferBinding<'a>>,
@@ -64,6 +70,13 @@ impl RawPassResources<'_> {
     /// recorded and not yet submitted.
     pub fn buffer_of(&self, label: &str, usage: wgpu::BufferUsages, bytes: &[u8]) -> wgpu::Buffer {
         self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(label), contents: bytes, usage })
+    }
+
+    /// `@group(1)` with the textures of a material. It is the same one for materials whose textures have together no
+    /// more sizes, formats and samplers than [`Material::MAX_TEXTURES`].
+    pub fn bind_group_of_material(&self, material: Handle<Material>) -> &wgpu::BindGroup {
+        let set = self.texture_sets.set_of(material.index());
+        self.materials_bind_groups.get(set as usize).unwrap_or(self.bind_groups[1])
     }
 
     /// The values of a column of objects.

@@ -80,7 +80,7 @@ pub use object_set::ObjectSet;
 pub use owned_scene::{ObjectHandle, RenderObject, Scene};
 pub use projection::Projection;
 pub use redraw::Redraw;
-pub use sampler::{Filter, Outside, Sampler};
+pub use sampler::{AddressMode, Filter, Sampler};
 pub use scene_ref::SceneRef;
 pub use static_group::StaticGroup;
 pub use texture::{Texture, TextureClass, TextureFormat};

@@ -195,7 +195,8 @@ impl Texture {
 
     /// The same texture with another sampler.
     pub fn sampled_by(mut self, sampler: Sampler) -> Self {
-        self.class.sampler = sampler;
+        // Equal samplers share an array.
+        self.class.sampler = Sampler { anisotropy: sampler.anisotropy.clamp(1, 16), ..sampler };
         self
     }
 

@@ -1,23 +1,30 @@
 //! Textures keep their size, their format and their texels, however many there are of how many sizes.
 
-use std::sync::Arc;
+use std::error::Error;
+use std::sync::{Arc, OnceLock};
 
 use drawloom::backend::{Picture, SoftwareBackend};
 use drawloom::command::Selection;
 use drawloom::glam::{DVec3, Vec3};
-use drawloom::process::{CommandDraws, Declare, Deferred, Draws, InjectionPoint, RenderProcess};
+use drawloom::handle::Handle;
+use drawloom::process::{
+    ClearColor, CommandDraws, Declare, Deferred, Draws, Format, InjectionPoint, ItemContext, ItemDraws, ItemRange,
+    ItemRecorder, Items, RecordItems, RenderProcess, SHADER_PRELUDE,
+};
 use drawloom::scene::{
-    Blend, Camera, Changes, Filter, Material, MaterialType, Mesh, Outside, Projection, RenderObject, Sampler, Scene,
-    SceneRef, StaticGroup, Texture, TextureFormat, Topology, Vertex,
+    AddressMode, Blend, Camera, Changes, Filter, Material, MaterialType, Mesh, Projection, RenderObject, Sampler,
+    Scene, SceneRef, StaticGroup, Texture, TextureFormat, Topology, Vertex,
 };
 use drawloom::task::Scheduler;
+use drawloom::wgpu::util::RenderEncoder;
+use drawloom::{FrameInputs, wgpu};
 use drawloom_testing::random::Random;
 use drawloom_testing::scenes::{sized, square};
 use half::f16;
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::fixture::{Fixture, draw_on_processor, half_floats};
+use crate::fixture::{Fixture, draw_on_processor, half_floats, pixel};
 use crate::strategies::{few_strategies, fixture_with};
 
 pub const CASES: &[Case] = &[
@@ -27,6 +34,7 @@ pub const CASES: &[Case] = &[
     ("static_groups_show_textures_that_are_replaced", static_groups),
     ("a_shader_finds_each_texture_of_a_material_in_its_place", places),
     ("textures_are_read_as_their_samplers_say", samplers),
+    ("code_that_records_items_binds_the_textures_of_each_material", of_items),
 ];
 
 /// Pixels to a side of a tile, which one object covers.
@@ -302,6 +310,130 @@ fn places() -> Result<(), Failed> {
     Ok(())
 }
 
+struct TileProcess;
+
+/// Draws a tile for each material, with a pipeline of its own and the prelude.
+struct Tiles {
+    materials: Vec<Handle<Material>>,
+    pipeline: OnceLock<wgpu::RenderPipeline>,
+}
+
+const TILE_SHADER: &str = "
+    struct Corner {
+        @builtin(position) position: vec4<f32>,
+        @location(0) @interpolate(flat) material: u32,
+    }
+
+    @vertex
+    fn vertex(@builtin(vertex_index) corner: u32, @builtin(instance_index) material: u32) -> Corner {
+        let at = vec2(f32(material % 4u), f32(material / 4u)) + vec2(f32(corner & 1u), f32(corner >> 1u));
+        return Corner(vec4(at / 2.0 - 1.0, 0.5, 1.0), material);
+    }
+
+    @fragment
+    fn fragment(in: Corner) -> @location(0) vec4<f32> {
+        return texture_level_0(materials[in.material], 0u, vec2(0.5));
+    }
+";
+
+impl RenderProcess for TileProcess {
+    fn name(&self) -> &str {
+        "tiles"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.clears_color("picture", Format::Rgba8Unorm, ClearColor::Value([0.0; 4]));
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::Items(ItemDraws::default())
+    }
+}
+
+impl Tiles {
+    fn pipeline(&self, context: &ItemContext<'_>) -> &wgpu::RenderPipeline {
+        self.pipeline.get_or_init(|| {
+            let device = context.resources.device;
+            let shader = ["const ABSOLUTE_TRANSFORMS: bool = false;", &SHADER_PRELUDE, TILE_SHADER].concat();
+            let source = wgpu::ShaderSource::Wgsl(shader.into());
+            let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: None, source });
+            let bind_group_layouts = context.resources.bind_group_layouts.map(Some);
+            let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                bind_group_layouts: &bind_group_layouts,
+                ..wgpu::PipelineLayoutDescriptor::default()
+            });
+            device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+                label: Some("tiles"),
+                layout: Some(&layout),
+                vertex: wgpu::VertexState {
+                    module: &module,
+                    entry_point: Some("vertex"),
+                    compilation_options: wgpu::PipelineCompilationOptions::default(),
+                    buffers: &[],
+                },
+                primitive: wgpu::PrimitiveState {
+                    topology: wgpu::PrimitiveTopology::TriangleStrip,
+                    ..wgpu::PrimitiveState::default()
+                },
+                depth_stencil: None,
+                multisample: wgpu::MultisampleState::default(),
+                fragment: Some(wgpu::FragmentState {
+                    module: &module,
+                    entry_point: Some("fragment"),
+                    compilation_options: wgpu::PipelineCompilationOptions::default(),
+                    targets: &[context.color_formats[0].map(Into::into)],
+                }),
+                multiview_mask: None,
+                cache: None,
+            })
+        })
+    }
+}
+
+impl RecordItems for Tiles {
+    fn record<'e>(
+        &'e self,
+        encoder: &mut dyn RenderEncoder<'e>,
+        items: ItemRange<'e>,
+        context: &'e ItemContext<'_>,
+    ) -> Result<(), Box<dyn Error + Send + Sync>> {
+        encoder.set_pipeline(self.pipeline(context));
+        encoder.set_bind_group(0, Some(context.resources.bind_groups[0]), &[]);
+        for &item in items.items() {
+            let material = self.materials[item as usize];
+            encoder.set_bind_group(1, Some(context.resources.bind_group_of_material(material)), &[]);
+            encoder.draw(0..4, material.index()..material.index() + 1);
+        }
+        Ok(())
+    }
+}
+
+/// Materials whose textures have more sizes than are bound together.
+fn of_items() -> Result<(), Failed> {
+    let mut scene = Scene::new();
+    let mut materials = Vec::new();
+    for index in 0..16 {
+        let texels = [index * 10, 255 - index, index, 255].repeat(usize::from(index) + 1);
+        let format = TextureFormat::Rgba8Unorm;
+        let texture = Texture::with_levels("color", format, [u32::from(index) + 1, 1], vec![texels])?;
+        let texture = scene.add(texture)?;
+        materials.push(scene.add(Material { texture: Some(texture), ..Material::default() })?);
+    }
+    let tiles = Tiles { materials, pipeline: OnceLock::new() };
+    let mut fixture = Fixture::with(2, |builder| builder.process(TileProcess).output("picture"))?;
+    scene.cameras = vec![sized(Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z), [16, 16])];
+    let lent = [Items::new("tiles", &[0; 16], ItemRecorder::Any(&tiles))];
+    let recorded =
+        fixture.renderer.record_with(FrameInputs { items: &lent, ..FrameInputs::new(scene.as_scene_ref()) })?;
+    let picture = fixture.submit(recorded)?.read(0, "picture")?;
+    for index in 0..16 {
+        let found = pixel(&picture, index % 4 * 4 + 1, 15 - (index / 4 * 4 + 1));
+        let index = index as u8;
+        assert_eq!(found, [index * 10, 255 - index, index], "material {index}");
+    }
+    Ok(())
+}
+
 /// A texture of a few texels on a square that shows more than it, magnified, and one of many texels, reduced, with every
 /// kind of sampler: on the device and in software.
 fn samplers() -> Result<(), Failed> {
@@ -317,15 +449,19 @@ fn samplers() -> Result<(), Failed> {
     for (width, height) in [(3, 2), (80, 70)] {
         let texels: Vec<u8> = (0..width * height * 4).map(|_| random.below(256) as u8).collect();
         let texture = Texture::new("noise", width, height, texels)?;
-        for outside in [Outside::Repeat, Outside::Mirror, Outside::Clamp] {
-            for (filter, levels) in [
+        for mode in [AddressMode::Repeat, AddressMode::Mirror, AddressMode::Clamp] {
+            for (filter, mip_filter) in [
                 (Filter::Linear, Some(Filter::Linear)),
                 (Filter::Nearest, Some(Filter::Nearest)),
                 (Filter::Linear, None),
             ] {
-                let (magnified, reduced) = (filter, filter);
-                let sampler =
-                    Sampler { outside: [outside, Outside::Repeat], magnified, reduced, levels, anisotropy: 1 };
+                let sampler = Sampler {
+                    address_modes: [mode, AddressMode::Repeat],
+                    mag_filter: filter,
+                    min_filter: filter,
+                    mip_filter,
+                    anisotropy: 1,
+                };
                 let mut scene = wall(1, &[texture.clone().sampled_by(sampler)], Blend::None)?;
                 scene.cameras[0].size = [60, 60];
                 let handle = scene.assets().iter::<Mesh>().map(|(handle, _)| handle).next();

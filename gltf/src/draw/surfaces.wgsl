@@ -88,7 +88,7 @@ fn is_hole(in: Corner, material: GltfMaterial) -> bool {
     let first = Coordinates(in.uv, vec2<f32>(0.0), vec2<f32>(0.0));
     let second = Coordinates(in.second_uv, vec2<f32>(0.0), vec2<f32>(0.0));
     let used = placed(material.base_color_texture, AllCoordinates(first, second));
-    let texel = texture_in_full(materials[in.material], BASE_COLOR, used.uv);
+    let texel = texture_level_0(materials[in.material], BASE_COLOR, used.uv);
     return material.base_color.a * in.color.a * texel.a < material.alpha_cutoff;
 }
 

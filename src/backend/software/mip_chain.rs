@@ -7,7 +7,7 @@ use half::f16;
 
 use crate::backend::mip_generation::{mip_chain, srgb_to_linear};
 use crate::raster::{Real, Vector, Vector2, Vector4};
-use crate::scene::{Filter, Outside, Texture, TextureClass, TextureFormat};
+use crate::scene::{AddressMode, Filter, Texture, TextureClass, TextureFormat};
 
 /// All mip levels of a texture.
 pub(super) struct MipChain {
@@ -40,9 +40,9 @@ impl MipChain {
         };
         let longest = finite(length(dpdx).max(length(dpdy)).sqrt());
         let (sampler, last) = (self.class.sampler, self.levels.len() - 1);
-        let filter = if longest > R::one() { sampler.reduced } else { sampler.magnified };
+        let filter = if longest > R::one() { sampler.min_filter } else { sampler.mag_filter };
         let level = longest.max(R::one()).log2().min(R::of(last as f64));
-        match sampler.levels {
+        match sampler.mip_filter {
             Some(Filter::Linear) => {}
             Some(Filter::Nearest) => {
                 return self.sample_level(filter, (level + R::of(0.5)).floor().as_f64() as usize, uv);
@@ -63,7 +63,7 @@ impl MipChain {
     fn sample_level<R: Real>(&self, filter: Filter, level: usize, uv: Vector2<R>) -> Vector4<R> {
         let size = self.class.level_size(level as u32);
         let [columns, rows] = std::array::from_fn(|axis| {
-            nearest_texels(uv[axis], self.class.sampler.outside[axis], size[axis], filter == Filter::Linear)
+            nearest_texels(uv[axis], self.class.sampler.address_modes[axis], size[axis], filter == Filter::Linear)
         });
         let mut sum = Vector::zero();
         for (row, row_weight) in rows {
@@ -96,12 +96,12 @@ impl MipChain {
 
 /// The two texels of a row of `size` that are nearest to a coordinate, each with its share; if `is_linear` is false, the
 /// nearest one has all.
-fn nearest_texels<R: Real>(coordinate: R, outside: Outside, size: u32, is_linear: bool) -> [(usize, R); 2] {
-    let period = if outside == Outside::Mirror { R::of(2.0) } else { R::one() };
+fn nearest_texels<R: Real>(coordinate: R, mode: AddressMode, size: u32, is_linear: bool) -> [(usize, R); 2] {
+    let period = if mode == AddressMode::Mirror { R::of(2.0) } else { R::one() };
     // The fraction is taken before scaling, so that far coordinates lose no more precision.
-    let within = match outside {
-        Outside::Clamp => coordinate.max(R::of(-1.0)).min(R::of(2.0)),
-        Outside::Repeat | Outside::Mirror => coordinate - (coordinate / period).floor() * period,
+    let within = match mode {
+        AddressMode::Clamp => coordinate.max(R::of(-1.0)).min(R::of(2.0)),
+        AddressMode::Repeat | AddressMode::Mirror => coordinate - (coordinate / period).floor() * period,
     };
     let middle = if is_linear { R::of(0.5) } else { R::zero() };
     let point = within * R::of(f64::from(size)) - middle;
@@ -109,10 +109,10 @@ fn nearest_texels<R: Real>(coordinate: R, outside: Outside, size: u32, is_linear
     let share = if is_linear { point - first } else { R::zero() };
     let texel = |step: i64| {
         let (index, size) = (first.as_f64() as i64 + step, i64::from(size));
-        let inside = match outside {
-            Outside::Clamp => index.clamp(0, size - 1),
-            Outside::Repeat => index.rem_euclid(size),
-            Outside::Mirror => {
+        let inside = match mode {
+            AddressMode::Clamp => index.clamp(0, size - 1),
+            AddressMode::Repeat => index.rem_euclid(size),
+            AddressMode::Mirror => {
                 let index = index.rem_euclid(2 * size);
                 index.min(2 * size - 1 - index)
             }
@@ -207,10 +207,10 @@ pub(super) mod tests {
 
     #[test]
     fn beyond_the_edges_a_texture_is_what_its_sampler_says() {
-        let row = |outside| -> Vec<u8> {
+        let row = |mode| -> Vec<u8> {
             let texels = (0..3).flat_map(|red| [red, 0, 0, 255]).collect();
             let texture = Texture::with_levels("row", TextureFormat::Rgba8Unorm, [3, 1], vec![texels]).unwrap();
-            let sampler = Sampler { outside: [outside; 2], ..Sampler::NEAREST };
+            let sampler = Sampler { address_modes: [mode; 2], ..Sampler::NEAREST };
             let chain = MipChain::of(&texture.sampled_by(sampler)).unwrap();
             (-6..9)
                 .map(|column| {
@@ -219,9 +219,9 @@ pub(super) mod tests {
                 })
                 .collect()
         };
-        assert_eq!(row(Outside::Repeat), [0, 1, 2, 0, 1, 2, 0, 1, 2, 0, 1, 2, 0, 1, 2]);
-        assert_eq!(row(Outside::Mirror), [0, 1, 2, 2, 1, 0, 0, 1, 2, 2, 1, 0, 0, 1, 2]);
-        assert_eq!(row(Outside::Clamp), [0, 0, 0, 0, 0, 0, 0, 1, 2, 2, 2, 2, 2, 2, 2]);
+        assert_eq!(row(AddressMode::Repeat), [0, 1, 2, 0, 1, 2, 0, 1, 2, 0, 1, 2, 0, 1, 2]);
+        assert_eq!(row(AddressMode::Mirror), [0, 1, 2, 2, 1, 0, 0, 1, 2, 2, 1, 0, 0, 1, 2]);
+        assert_eq!(row(AddressMode::Clamp), [0, 0, 0, 0, 0, 0, 0, 1, 2, 2, 2, 2, 2, 2, 2]);
     }
 
     #[test]

@@ -257,15 +257,15 @@ fn metres_from_origin(low: vec3<u32>, high: vec3<i32>) -> vec3<f32> {
     return fixed_difference(low, high, vec3<u32>(0u), vec3<i32>(0));
 }
 
-// Whether a material has a texture in a place from 0 to 5, and it is on the device.
-fn has_texture(material: Material, place: u32) -> bool {
-    return material.textures[place] != NO_TEXTURE;
+// Whether a material has a texture of this index, from 0 to 5, and it is on the device.
+fn has_texture(material: Material, index: u32) -> bool {
+    return material.textures[index] != NO_TEXTURE;
 }
 
-// A texture of a material, in a place from 0 to 5, at texture coordinates; white if it has none. The caller takes the
+// A texture of a material, by its index from 0 to 5, at texture coordinates; white if it has none. The caller takes the
 // derivatives of `uv`, because that needs uniform control flow.
-fn texture_at(material: Material, place: u32, uv: vec2<f32>, uv_dx: vec2<f32>, uv_dy: vec2<f32>) -> vec4<f32> {
-    let texture = material.textures[place];
+fn texture_at(material: Material, index: u32, uv: vec2<f32>, uv_dx: vec2<f32>, uv_dy: vec2<f32>) -> vec4<f32> {
+    let texture = material.textures[index];
     let layer = texture & 0xffffffu;
     switch texture >> 24u {
         case 0u: { return textureSampleGrad(textures_0, sampler_0, uv, layer, uv_dx, uv_dy); }
@@ -278,9 +278,9 @@ fn texture_at(material: Material, place: u32, uv: vec2<f32>, uv_dx: vec2<f32>, u
     }
 }
 
-// The same at full resolution.
-fn texture_in_full(material: Material, place: u32, uv: vec2<f32>) -> vec4<f32> {
-    let texture = material.textures[place];
+// The same from mip level 0.
+fn texture_level_0(material: Material, index: u32, uv: vec2<f32>) -> vec4<f32> {
+    let texture = material.textures[index];
     let layer = texture & 0xffffffu;
     switch texture >> 24u {
         case 0u: { return textureSampleLevel(textures_0, sampler_0, uv, layer, 0.0); }
@@ -301,7 +301,7 @@ fn diffuse_at(material: Material, uv: vec2<f32>, uv_dx: vec2<f32>, uv_dy: vec2<f
 // Whether a mask has a hole at texture coordinates. It is read at the texture's full resolution, because an averaged
 // alpha may be below the cutoff everywhere: leaves would vanish in the distance.
 fn is_cut_out(material: Material, uv: vec2<f32>) -> bool {
-    return material.opacity * texture_in_full(material, 0u, uv).a < material.alpha_cutoff;
+    return material.opacity * texture_level_0(material, 0u, uv).a < material.alpha_cutoff;
 }
 
 // Texture coordinates of a vertex that can be interpolated.

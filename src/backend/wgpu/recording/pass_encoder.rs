@@ -225,7 +225,8 @@ impl<'a> PassEncoder<'a> {
         let buffers = |buffer| frame.storage_buffers.find(buffer);
         let of_frame = self.state.frame_bind_group.as_ref();
         let of_frame = of_frame.ok_or_else(|| broken_rule("a pass has bind groups before it is recorded"))?;
-        let of_materials = frame.buffers.materials_bind_groups().first();
+        let materials_bind_groups = frame.buffers.materials_bind_groups();
+        let of_materials = materials_bind_groups.first();
         let of_materials =
             of_materials.ok_or_else(|| broken_rule("a frame has its materials before it is recorded"))?;
         let view = &self.request.views[pass.view_index];
@@ -235,6 +236,8 @@ impl<'a> PassEncoder<'a> {
             size: view.camera.size,
             bind_group_layouts: [&frame.layouts.frame, &frame.layouts.assets],
             bind_groups: [of_frame, of_materials],
+            materials_bind_groups,
+            texture_sets: self.request.objects.texture_sets(),
             access: RawAccess::new(name, declaration, requests),
             columns: &columns,
             materials: &materials,

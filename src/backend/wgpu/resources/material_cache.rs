@@ -8,10 +8,10 @@ use bytemuck::Zeroable;
 
 use super::buffers::CountedQueue;
 use super::snapshot_lifetimes::SnapshotToken;
-use super::texture_arrays::{ResidentTextures, TextureLocation, empty_array};
+use super::texture_arrays::{ArrayViews, ResidentTextures, TextureLocation};
 use crate::backend::{BackendError, SceneLimits};
 use crate::handle::Handle;
-use crate::scene::{Assets, Filter, Material, MaterialLayout, Outside, Sampler, Texture};
+use crate::scene::{AddressMode, Assets, Filter, Material, MaterialLayout, Sampler, Texture};
 use crate::view::{GpuObject, IssueReason, SceneIssues, TextureSet, TextureSets};
 
 /// The materials of a frame, and their textures. It stays valid while they change for later frames.
@@ -53,8 +53,11 @@ pub(crate) struct MaterialCache {
     /// By material slot, whether one of its textures is not on the device.
     pub(crate) lacks_texture: Arc<[bool]>,
     current: Option<Current>,
-    /// The views of the texture arrays, with how often arrays had moved, or been divided into other sets.
+    /// With how often arrays had moved, or been divided into other sets.
     bound_textures: Option<(u64, Arc<MaterialTextures>)>,
+    /// What sets bind. It is kept, so that the sets whose arrays stay where they are keep their bind groups.
+    views: Option<ArrayViews>,
+    samplers: HashMap<Sampler, wgpu::Sampler>,
     /// Scene issues that making the snapshot found. Every frame that uses the snapshot reports them.
     rejected_textures: Vec<(IssueReason, usize)>,
     rejected_materials: Vec<(IssueReason, usize)>,
@@ -137,15 +140,15 @@ impl MaterialCache {
         if let Some((_, textures)) = self.bound_textures.as_ref().filter(|(of, _)| *of == moves) {
             return Arc::clone(textures);
         }
-        let (views, empty) = (self.textures.views(), empty_array(device));
-        let mut samplers = HashMap::new();
+        let (views, samplers) = (self.views.get_or_insert_with(|| ArrayViews::new(device)), &mut self.samplers);
+        views.update(self.textures.arrays());
         let mut sampler_of = |sampler: Sampler| -> wgpu::Sampler {
             samplers.entry(sampler).or_insert_with(|| new_sampler(device, "textures", sampler)).clone()
         };
         let target_sampler = sampler_of(Sampler::CLAMP);
         let mut bound = |set: &TextureSet| {
             let array = |position: usize| set.arrays().get(position).map(|array| *array as usize);
-            let view = |position| array(position).and_then(|array| views[array].as_ref()).unwrap_or(&empty).clone();
+            let view = |position| views.of_array(array(position)).clone();
             let mut sampler = |position| {
                 sampler_of(array(position).map_or(Sampler::REPEAT, |array| sets.arrays()[array].class.sampler))
             };
@@ -213,10 +216,10 @@ fn element_count(assets: &Assets, stride: usize, limits: SceneLimits) -> usize {
 }
 
 fn new_sampler(device: &wgpu::Device, label: &str, sampler: Sampler) -> wgpu::Sampler {
-    let [address_mode_u, address_mode_v] = sampler.outside.map(|outside| match outside {
-        Outside::Repeat => wgpu::AddressMode::Repeat,
-        Outside::Mirror => wgpu::AddressMode::MirrorRepeat,
-        Outside::Clamp => wgpu::AddressMode::ClampToEdge,
+    let [address_mode_u, address_mode_v] = sampler.address_modes.map(|mode| match mode {
+        AddressMode::Repeat => wgpu::AddressMode::Repeat,
+        AddressMode::Mirror => wgpu::AddressMode::MirrorRepeat,
+        AddressMode::Clamp => wgpu::AddressMode::ClampToEdge,
     });
     let filter = |filter| match filter {
         Filter::Nearest => wgpu::FilterMode::Nearest,
@@ -226,15 +229,19 @@ fn new_sampler(device: &wgpu::Device, label: &str, sampler: Sampler) -> wgpu::Sa
         label: Some(label),
         address_mode_u,
         address_mode_v,
-        mag_filter: filter(sampler.magnified),
-        min_filter: filter(sampler.reduced),
-        mipmap_filter: match sampler.levels {
+        mag_filter: filter(sampler.mag_filter),
+        min_filter: filter(sampler.min_filter),
+        mipmap_filter: match sampler.mip_filter {
             Some(Filter::Linear) => wgpu::MipmapFilterMode::Linear,
             Some(Filter::Nearest) | None => wgpu::MipmapFilterMode::Nearest,
         },
         // A quarter of a level, so that a device tells what is reduced from what is magnified (Vulkan,
         // `VkSamplerCreateInfo`).
-        lod_max_clamp: if sampler.levels.is_some() { wgpu::SamplerDescriptor::default().lod_max_clamp } else { 0.25 },
+        lod_max_clamp: if sampler.mip_filter.is_some() {
+            wgpu::SamplerDescriptor::default().lod_max_clamp
+        } else {
+            0.25
+        },
         anisotropy_clamp: sampler.effective_anisotropy(),
         ..wgpu::SamplerDescriptor::default()
     })

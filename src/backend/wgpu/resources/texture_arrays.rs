@@ -157,15 +157,9 @@ impl ResidentTextures {
         Ok(())
     }
 
-    /// A view of each array; `None` for one that is empty.
-    pub(super) fn views(&self) -> Vec<Option<wgpu::TextureView>> {
-        let view = |texture: &wgpu::Texture| {
-            texture.create_view(&wgpu::TextureViewDescriptor {
-                dimension: Some(wgpu::TextureViewDimension::D2Array),
-                ..wgpu::TextureViewDescriptor::default()
-            })
-        };
-        self.memory.arrays.iter().map(|array| array.layers.texture().map(view)).collect()
+    /// The texture of each array; `None` for one that is empty.
+    pub(super) fn arrays(&self) -> impl ExactSizeIterator<Item = Option<&wgpu::Texture>> {
+        self.memory.arrays.iter().map(|array| array.layers.texture())
     }
 
     /// Makes room for `textures` further textures in an array, if the device allows that number of layers.
@@ -207,11 +201,39 @@ impl ResidentTextures {
     }
 }
 
-/// A view of an array of a single texel, to be bound where there is none.
-pub(super) fn empty_array(device: &wgpu::Device) -> wgpu::TextureView {
-    let (format, sampler) = (TextureFormat::Rgba8Unorm, Sampler::REPEAT);
-    let class = TextureClass { width: 1, height: 1, format, mip_levels: 1, sampler };
-    new_array(device, class, 1).create_view(&wgpu::TextureViewDescriptor {
+/// The views of texture arrays. An array has the same one as long as it stays where it is.
+pub(super) struct ArrayViews {
+    of_arrays: Vec<Option<(wgpu::Texture, wgpu::TextureView)>>,
+    /// Of an array of a single texel, to be bound where there is none.
+    empty: wgpu::TextureView,
+}
+
+impl ArrayViews {
+    pub(super) fn new(device: &wgpu::Device) -> Self {
+        let (format, sampler) = (TextureFormat::Rgba8Unorm, Sampler::REPEAT);
+        let class = TextureClass { width: 1, height: 1, format, mip_levels: 1, sampler };
+        Self { of_arrays: Vec::new(), empty: view_of(&new_array(device, class, 1)) }
+    }
+
+    /// Makes the views of arrays that have moved.
+    pub(super) fn update<'a>(&mut self, arrays: impl ExactSizeIterator<Item = Option<&'a wgpu::Texture>>) {
+        self.of_arrays.resize(arrays.len(), None);
+        for (known, array) in self.of_arrays.iter_mut().zip(arrays) {
+            if known.as_ref().map(|(texture, _)| texture) != array {
+                *known = array.map(|texture| (texture.clone(), view_of(texture)));
+            }
+        }
+    }
+
+    /// That of an array, by index; that of an empty one where there is none.
+    pub(super) fn of_array(&self, array: Option<usize>) -> &wgpu::TextureView {
+        let known = array.and_then(|array| self.of_arrays.get(array)?.as_ref());
+        known.map_or(&self.empty, |(_, view)| view)
+    }
+}
+
+fn view_of(array: &wgpu::Texture) -> wgpu::TextureView {
+    array.create_view(&wgpu::TextureViewDescriptor {
         dimension: Some(wgpu::TextureViewDimension::D2Array),
         ..wgpu::TextureViewDescriptor::default()
     })

@@ -143,6 +143,9 @@ fn format_of(format: TextureFormat) -> wgpu::TextureFormat {
     }
 }
 
+/// The most bytes that are copied at once: a level may have more than a buffer can.
+const MAX_COPY_BYTES: u32 = 64 << 20;
+
 /// Records a copy of a texture, with all mip levels, to a layer.
 ///
 /// # Errors
@@ -154,8 +157,14 @@ pub(super) fn copy_layer(
     layer: u32,
     texture: &Texture,
 ) -> Result<(), BackendError> {
+    let class = texture.class();
     for (level, bytes) in (0..).zip(mip_chain(texture)) {
-        copy_rows(device, encoder, (array, texture.class()), (layer, level), 0, &bytes)?;
+        let (_, row_bytes) = class.level_rows(level);
+        let rows = (MAX_COPY_BYTES / row_bytes.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT)).max(1);
+        let portions = bytes.chunks((rows * row_bytes) as usize);
+        for (first, portion) in (0..).step_by(rows as usize).zip(portions) {
+            copy_rows(device, encoder, (array, class), (layer, level), first, portion)?;
+        }
     }
     Ok(())
 }
