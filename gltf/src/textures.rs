@@ -41,6 +41,8 @@ pub(crate) fn add_textures(
     warnings: &mut Warnings,
 ) -> Result<BTreeMap<TextureUse, Handle<Texture>>, Problem> {
     let (mut textures, mut left_out, mut bytes) = (BTreeMap::new(), Vec::new(), 0_u64);
+    // Textures that differ in their samplers share the pixels of an image.
+    let mut of_images: BTreeMap<(usize, ColorSpace), Texture> = BTreeMap::new();
     for used in uses {
         let Some(image) = images.get(&used.image) else { continue };
         if textures.contains_key(&used) || left_out.contains(&used) {
@@ -50,10 +52,14 @@ pub(crate) fn add_textures(
             ColorSpace::Srgb => TextureFormat::Rgba8Srgb,
             ColorSpace::Linear => TextureFormat::Rgba8Unorm,
         };
-        let (size, pixels) = (<[u32; 2]>::from(image.pixels.dimensions()), image.pixels.as_raw().clone());
-        let texture = Texture::with_levels(image.name.clone(), format, size, vec![pixels]);
-        let texture = texture.map_err(Problem::of_scene(&image.name));
+        let new = || {
+            let (size, pixels) = (<[u32; 2]>::from(image.pixels.dimensions()), image.pixels.as_raw().clone());
+            let texture = Texture::with_levels(image.name.clone(), format, size, vec![pixels]);
+            texture.map_err(Problem::of_scene(&image.name))
+        };
+        let texture = of_images.get(&(used.image, used.space)).map_or_else(new, |known| Ok(known.clone()));
         let Some(texture) = warnings.keep(texture, "a texture is left out")? else { continue };
+        of_images.insert((used.image, used.space), texture.clone());
         bytes = bytes.saturating_add(texture.class().bytes());
         if bytes > limits.all_textures_bytes {
             let (name, limit) = (&image.name, limits.all_textures_bytes);
