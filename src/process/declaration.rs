@@ -50,6 +50,12 @@ impl Declare {
         self.access(target.as_ref(), Access::ClearDepth(format));
     }
 
+    /// Clears the depth target to this depth instead of 0: to 1, for pipelines of an engine's own whose near plane is at
+    /// depth 0. A frame with a process that clears none, or clears it to a depth that is not from 0 to 1, is refused.
+    pub fn clears_depth_to(&mut self, depth: f32) {
+        self.declaration.depth_clear_value = Some(depth);
+    }
+
     /// Tests and writes a depth target over what another process drew.
     pub fn draws_depth(&mut self, target: impl AsRef<str>) {
         self.access(target.as_ref(), Access::DrawDepth);
@@ -380,6 +386,8 @@ pub struct Declaration {
     pub accesses: Vec<(String, Access)>,
     /// The sizes of targets that it creates, if they are not those of the pictures.
     pub sizes: Vec<(String, TargetSize)>,
+    /// The depth that the depth target is cleared to, if it is not 0.
+    pub depth_clear_value: Option<f32>,
     /// The targets that it makes multisampled.
     pub multisampled: Vec<String>,
     /// The targets that it gives mip levels: see [`Declare::mipmapped`].

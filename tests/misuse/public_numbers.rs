@@ -104,6 +104,8 @@ const RESULTS: &[&str] = &[
     "fence::DeviceProgress::advance",
     // Keys and versions are only compared. The extremes of bounds are in `tests/frame/items.rs`.
     "process::Items::",
+    // The index of a bind group, whose extremes are in `tests/pictures/item_data.rs`.
+    "process::ItemContext::",
     // Bits of a pipeline's own, which tell its plans apart and nothing else.
     "process::Requirements::with_own",
     // Layouts of types, made by constructors that check them.

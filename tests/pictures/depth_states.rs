@@ -24,6 +24,7 @@ pub const CASES: &[Case] = &[
     ("a_process_compares_depth_as_it_says", comparisons),
     ("what_shows_where_it_is_hidden_is_not_culled", hidden),
     ("a_depth_bias_moves_surfaces_nearer_or_farther", bias),
+    ("depth_is_cleared_to_the_value_that_a_process_says", cleared_depth),
     ("masked_channels_stay_as_they_are", color_masks),
     ("alpha_decides_how_much_of_a_pixel_is_covered", alpha_to_coverage),
     ("states_that_are_wrong_or_not_there_are_named", refused),
@@ -38,11 +39,12 @@ struct Painted {
     layer: LayerMask,
     state: PipelineState,
     is_multisampled: bool,
+    clears_depth_to: Option<f32>,
 }
 
 impl Painted {
     fn wall() -> Self {
-        Self { layer: WALL, state: PipelineState::default(), is_multisampled: false }
+        Self { layer: WALL, state: PipelineState::default(), is_multisampled: false, clears_depth_to: None }
     }
 
     fn sign(state: PipelineState) -> Self {
@@ -59,6 +61,9 @@ impl RenderProcess for Painted {
         if self.layer == WALL {
             declare.clears_color("color", Format::Rgba8Unorm, ClearColor::Value([0.0, 0.0, 0.0, 1.0]));
             declare.clears_depth("depth", Format::Depth32Float);
+            if let Some(value) = self.clears_depth_to {
+                declare.clears_depth_to(value);
+            }
             if self.is_multisampled {
                 declare.multisampled("color");
                 declare.multisampled("depth");
@@ -265,6 +270,30 @@ fn alpha_to_coverage() -> Result<(), Failed> {
         if found.iter().zip(expected).any(|(found, expected): (&u8, u8)| found.abs_diff(expected) > 1) {
             return Err(format!("{alpha_to_coverage}: {found:?}, not {expected:?}").into());
         }
+    }
+    Ok(())
+}
+
+/// A wall that is drawn where its depth is less than what is there: over 1, not over 0; and values that are refused.
+fn cleared_depth() -> Result<(), Failed> {
+    let (scene, layers) = signs(&[0.5])?;
+    let scene = SceneRef { layers: &layers, ..scene.as_scene_ref() };
+    let state = PipelineState { depth_comparison: Some(Comparison::Less), ..PipelineState::default() };
+    let wall = |value| Painted { state: state.clone(), clears_depth_to: value, ..Painted::wall() };
+    for (value, expected) in [(Some(1.0), [255, 0, 0]), (Some(0.0), [0; 3]), (None, [0; 3])] {
+        let mut fixture = Fixture::with(2, |builder| builder.process(wall(value)).output("color"))?;
+        let recorded = fixture.renderer.record(scene)?;
+        let picture = fixture.submit(recorded)?.read(0, "color")?;
+        let found = pixel(&picture, picture.width / 2, picture.height / 2);
+        assert_eq!(found, expected, "{value:?}");
+    }
+    for (value, expected) in [
+        (1.5, "process \"wall\" cannot clear depth to 1.5: it is not from 0 to 1"),
+        (-0.1, "process \"wall\" cannot clear depth to -0.1: it is not from 0 to 1"),
+        (f32::NAN, "process \"wall\" cannot clear depth to NaN: it is not from 0 to 1"),
+    ] {
+        let built = Fixture::with(1, |builder| builder.process(wall(Some(value))).output("color"));
+        assert_eq!(built.err().ok_or("it is built")?.message().unwrap_or_default(), expected);
     }
     Ok(())
 }

@@ -26,6 +26,7 @@ pub const CASES: &[Case] = &[
     ("data_of_items_grow_and_go", growing),
     ("views_have_items_and_data_of_their_own", of_views),
     ("code_that_records_items_knows_its_attachments", attachments),
+    ("items_have_no_more_bind_groups_than_they_may", too_many),
 ];
 
 const SIDE: u32 = 16;
@@ -247,6 +248,15 @@ fn growing() -> Result<(), Failed> {
         let items = Items { data, versions: &versions, ..Items::new("dots", &keys, ItemRecorder::Any(&engine)) };
         check(&frames.draw(&[items])?[0], &values, &format!("frame {frame}"))?;
     }
+    // The same items, whose kept bundles have the smaller buffer.
+    let (keys, versions) = ([0; 64], [1; 64]);
+    for (frame, further) in [0, 0, 0, 0, 5_000, 5_000, 0].into_iter().enumerate() {
+        let values = values(64, frame);
+        let mut data = bytes_of(&values);
+        data.resize(data.len() + further, 0);
+        let items = Items { data: &data, versions: &versions, ..Items::new("dots", &keys, ItemRecorder::Any(&engine)) };
+        check(&frames.draw(&[items])?[0], &values, &format!("{further} bytes more, frame {frame}"))?;
+    }
     let without_data = frames.draw(&[Items::new("dots", &[0], ItemRecorder::Any(&engine))]);
     let error = without_data.err().ok_or("nobody asked for the data")?;
     let message = error.message().unwrap_or_default();
@@ -284,6 +294,42 @@ fn of_views() -> Result<(), Failed> {
         for (frame, of_all) in [(5, 0), (6, 1)] {
             let pictures = frames.draw(&[set(ItemViews::All, 1, of_all)])?;
             pictures.iter().try_for_each(|picture| check(picture, &values[of_all], &label(frame)))?;
+        }
+    }
+    Ok(())
+}
+
+/// Asks for the bind group of an index.
+struct BindGroupAt(usize);
+
+impl RecordItems for BindGroupAt {
+    fn record<'e>(
+        &'e self,
+        _: &mut dyn RenderEncoder<'e>,
+        _: ItemRange<'e>,
+        context: &'e ItemContext<'_>,
+    ) -> Result<(), Box<dyn Error + Send + Sync>> {
+        context.bind_group(self.0, || {
+            let device = context.resources.device;
+            let layout =
+                device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: None, entries: &[] });
+            device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout: &layout, entries: &[] })
+        });
+        Ok(())
+    }
+}
+
+fn too_many() -> Result<(), Failed> {
+    let mut frames = Frames::new(backend()?, &["main"])?;
+    for index in [0, ItemContext::MAX_BIND_GROUPS - 1, ItemContext::MAX_BIND_GROUPS, usize::MAX] {
+        let drawn = frames.draw(&[Items::new("dots", &[0], ItemRecorder::Any(&BindGroupAt(index)))]);
+        match drawn {
+            Ok(_) => assert!(index < ItemContext::MAX_BIND_GROUPS, "{index}"),
+            Err(error) => {
+                let message = error.message().unwrap_or_default();
+                assert!(index >= ItemContext::MAX_BIND_GROUPS, "{index}: {message}");
+                assert!(message.contains("dots") && message.contains("panicked"), "{message}");
+            }
         }
     }
     Ok(())

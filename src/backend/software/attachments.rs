@@ -34,8 +34,8 @@ pub(super) struct ColorAttachment<R> {
 /// The depth target that a pass tests.
 pub(super) struct DepthAttachment<R> {
     pub(super) target: SoftwareTarget<R>,
-    /// Whether it is cleared first, to 0: infinitely far away.
-    pub(super) clears: bool,
+    /// What it is cleared to first, if it is cleared.
+    pub(super) clear: Option<R>,
     /// Whether the pass may write it; a draw may still not write it.
     pub(super) is_writable: bool,
     /// Whether only pixels whose depth equals the stored depth are drawn.
@@ -165,8 +165,9 @@ impl<R: Precision> TileAttachments<'_, R> {
                 pixel.copy_from_slice(&clear[..pixel.len()]);
             }
         }
-        if let (Some(TileDepth::Written(numbers)), true) = (&mut self.depth, depth.is_some_and(|depth| depth.clears)) {
-            numbers.fill(R::zero());
+        let clear = depth.and_then(|depth| depth.clear);
+        if let (Some(TileDepth::Written(numbers)), Some(clear)) = (&mut self.depth, clear) {
+            numbers.fill(clear);
         }
     }
 

@@ -176,7 +176,7 @@ fn attachments<R: Precision>(
     pass: Pass,
     targets: &SoftwareTargets<R>,
 ) -> Result<Attachments<R>, BackendError> {
-    let used = &request.plan.processes()[pass.process_index].targets;
+    let PlannedProcess { targets: used, declaration, .. } = &request.plan.processes()[pass.process_index];
     let of_view = |index: usize| targets.get(pass.view_index, index).cloned().ok_or_else(missing_target);
     let equations = request.draws[pass.process_index].blend_equations();
     let colors = used.colors.iter().enumerate().map(|(output, color)| {
@@ -186,8 +186,9 @@ fn attachments<R: Precision>(
     let depth = |(index, access): (usize, Access)| {
         let is_writable = access.writes_depth();
         let clears = is_writable && access != Access::DrawDepth;
+        let clear = clears.then(|| R::of(f64::from(declaration.depth_clear_value.unwrap_or(0.0))));
         let tests_equal = access == Access::MatchDepth;
-        Ok(DepthAttachment { target: of_view(index)?, clears, is_writable, tests_equal })
+        Ok(DepthAttachment { target: of_view(index)?, clear, is_writable, tests_equal })
     };
     let sampled = used.accesses.iter().filter_map(|&(target, access)| match access {
         Access::Sample | Access::SamplePrevious => Some(of_view(target).map(|target| vec![target])),

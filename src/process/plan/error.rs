@@ -138,6 +138,16 @@ pub enum PlanError {
         /// The process.
         process: String,
     },
+    /// A process clears depth to a value that is not from 0 to 1, or clears none.
+    #[error("process {process:?} cannot clear depth to {value}: {problem}")]
+    DepthClearValue {
+        /// The process.
+        process: String,
+        /// The value.
+        value: String,
+        /// What is wrong.
+        problem: &'static str,
+    },
     /// A target that cannot be multisampled is declared so, or is used as no multisampled target can be.
     #[error("process {process:?} cannot use target {target:?} as a multisampled one: {problem}")]
     Multisampling {

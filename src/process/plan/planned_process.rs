@@ -79,6 +79,18 @@ impl PlannedProcess {
         if declaration.accesses.iter().filter(|(_, access)| access.is_depth()).count() > 1 {
             return Err(PlanError::MultipleDepthTargets { process: name });
         }
+        if let Some(value) = declaration.depth_clear_value {
+            let clears =
+                |(_, access): &(String, Access)| matches!(access, Access::ClearDepth(_) | Access::ClearDepthLayer(_));
+            let problem = match declaration.accesses.iter().any(clears) {
+                true if (0.0..=1.0).contains(&value) => None,
+                true => Some("it is not from 0 to 1"),
+                false => Some("it clears no depth target"),
+            };
+            if let Some(problem) = problem {
+                return Err(PlanError::DepthClearValue { process: name, value: value.to_string(), problem });
+            }
+        }
         let Declaration { views, also_views, .. } = &declaration;
         let shares_chain = |kind: &ViewKind| is_chained && kind.rules().shares_chain_of == Some(*views);
         let further = also_views.iter().copied().chain(ViewKind::ALL.into_iter().filter(shares_chain));

@@ -35,6 +35,7 @@ pub const CASES: &[NumberCase] = &[
     NumberCase {
         name: "draws_and_workgroups_of_any_number",
         numbers: &[
+            "process::Declare::clears_depth_to",
             "process::DrawCount::Count::instances",
             "process::DrawCount::Count::vertices",
             "process::Workgroups::Count",
@@ -122,6 +123,25 @@ impl RenderProcess for Process {
     }
 }
 
+/// Clears a depth target to this depth.
+struct ClearsDepth(f32);
+
+impl RenderProcess for ClearsDepth {
+    fn name(&self) -> &str {
+        "a process"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.clears_depth("depth", Format::Depth32Float);
+        declare.clears_depth_to(self.0);
+        declare.keep();
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::Procedural(ProceduralDraws::default())
+    }
+}
+
 fn draw(process: Process) -> Result<(), Failed> {
     let builder = Renderer::builder(noop_backend()?).pipeline(Deferred::to_picture()).process(process);
     let (renderer, submitter) = builder.build(Arc::new(Scheduler::new(1)?))?;
@@ -188,6 +208,10 @@ fn draws() -> Result<(), Failed> {
             let drawn = draw(Process { size: TargetSize::Picture, layers: None, draws: Draws::Procedural(draws) });
             ensure(drawn.is_ok() == number.is_finite(), format_args!("{depth_bias:?}: {drawn:?}"))?;
         }
+    }
+    for number in FLOATS {
+        let built = Renderer::builder(NullBackend).process(ClearsDepth(number)).build(Arc::new(Scheduler::new(1)?));
+        ensure(built.is_ok() == (0.0..=1.0).contains(&number), format_args!("cleared to {number}"))?;
     }
     for mask in [0, 1, u8::MAX] {
         let stencils = [

@@ -67,8 +67,8 @@ impl<'a> PassEncoder<'a> {
             Some((index, access)) => {
                 let target = target(index)?;
                 let (is_loaded, store) = (access.keeps_depth() || !segment.is_first, wgpu::StoreOp::Store);
-                // Depth is reversed: 0 is infinitely far away.
-                let depth = if is_loaded { wgpu::LoadOp::Load } else { wgpu::LoadOp::Clear(0.0) };
+                let clear_value = self.planned.declaration.depth_clear_value.unwrap_or(0.0);
+                let depth = if is_loaded { wgpu::LoadOp::Load } else { wgpu::LoadOp::Clear(clear_value) };
                 let stencil = if is_loaded { wgpu::LoadOp::Load } else { wgpu::LoadOp::Clear(0) };
                 let writes_depth = target.format().has_depth() && access.writes_depth();
                 let writes_stencil = target.format().has_stencil() && access.writes();
