@@ -195,6 +195,18 @@ impl Draws<'_> {
         }
     }
 
+    /// Whether the engine encodes the pass itself.
+    #[cfg(feature = "wgpu")]
+    pub(crate) fn is_raw(&self) -> bool {
+        matches!(self, Self::Raw(_))
+    }
+
+    /// Whether the engine encodes the pass itself, which it does with wgpu alone.
+    #[cfg(not(feature = "wgpu"))]
+    pub(crate) fn is_raw(&self) -> bool {
+        false
+    }
+
     /// The column by which it orders objects; `None` if it orders them in another way.
     pub(crate) fn order_column(&self) -> Option<ColumnLayout> {
         match self.selection()?.order {

@@ -9,14 +9,21 @@ use super::raw_access::RawAccess;
 use super::{AccessError, BufferLayout, StorageBuffer};
 use crate::handle::Handle;
 use crate::scene::{ColumnLayout, Material, MaterialLayout, MaterialType, ObjectColumn, ViewKind};
-use crate::view::TextureSets;
+use crate::view::{RenderView, TextureSets};
 
 /// A pass that gets the command encoder, because compute, copies and viewports cannot be recorded into a bundle.
 ///
 /// It is called on a worker, once per frame and view of its process's kind, or
-/// [once a frame](super::Declare::once_a_frame).
+/// [once a frame](super::Declare::once_a_frame); for each of its encoders, if it has several.
 pub trait RawPass: Send + Sync {
-    /// Encodes the pass.
+    /// The number of encoders that the pass is encoded in for a view: one, unless it says more. They are encoded at the
+    /// same time, on any workers, and submitted in order. It is called when the frame begins. A frame with a pass of
+    /// more than [`MAX_ENCODERS`](RawPassResources::MAX_ENCODERS) fails; 0 counts as 1.
+    fn encoder_count(&self, _view: &RenderView) -> usize {
+        1
+    }
+
+    /// Encodes the pass, or [one of its encoders](RawPassResources::encoder).
     ///
     /// # Errors
     /// Any error of the engine, or an [`AccessError`] of a lookup: the frame fails with an error that names the
@@ -48,6 +55,8 @@ pub struct RawPassResources<'a> {
     pub view: usize,
     /// Width and height of the view's picture, in pixels.
     pub size: [u32; 2],
+    /// Which of the pass's [encoders](RawPass::encoder_count) is encoded: from 0 on, in the order of submission.
+    pub encoder: usize,
     /// The layouts of [`RawPassResources::bind_groups`], for pipelines of the pass's own.
     pub bind_group_layouts: [&'a wgpu::BindGroupLayout; 2],
     /// `@group(0)` and `@group(1)` of the [prelude](super::SHADER_PRELUDE), for vertex, fragment and compute shaders:
@@ -66,6 +75,9 @@ pub struct RawPassResources<'a> {
 }
 
 impl RawPassResources<'_> {
+    /// The most encoders of a pass in a view.
+    pub const MAX_ENCODERS: usize = 256;
+
     /// A new buffer with these bytes, for this frame. A write through the queue would be seen by every frame that is
     /// recorded and not yet submitted.
     pub fn buffer_of(&self, label: &str, usage: wgpu::BufferUsages, bytes: &[u8]) -> wgpu::Buffer {

@@ -58,6 +58,7 @@ mod prepared_pipelines;
 mod previous_objects;
 mod processes;
 mod random_scenes;
+mod raw_encoders;
 mod rays;
 mod read_back;
 mod redraw;
@@ -148,6 +149,7 @@ fn main() {
         (prepared_pipelines::CASES, Needs::Adapter),
         (processes::CASES, Needs::Adapter),
         (random_scenes::CASES, Needs::Adapter),
+        (raw_encoders::CASES, Needs::Adapter),
         (read_back::CASES, Needs::Adapter),
         (redraw::CASES, Needs::Adapter),
         (references::CASES, Needs::Adapter),

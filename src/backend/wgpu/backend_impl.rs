@@ -233,6 +233,9 @@ impl FrameRecorder for WgpuBackend {
             }
             return Ok(());
         }
+        if !pass.draws_commands {
+            return Ok(());
+        }
         if self.streamer.is_some() {
             mark_drawn(frame, request, list);
         }
@@ -261,7 +264,12 @@ impl FrameRecorder for WgpuBackend {
     }
 
     fn part_count(&self, frame: &WgpuFrame, pass: &PassRequest<'_>) -> usize {
-        frame.pass(pass.index).strategy.part_count(pass.list)
+        let state = frame.pass(pass.index);
+        match state.raw_encoders {
+            0 => state.strategy.part_count(pass.list),
+            1 => 0,
+            encoders => encoders,
+        }
     }
 
     fn record(
@@ -272,11 +280,12 @@ impl FrameRecorder for WgpuBackend {
         emit: &mut dyn FnMut(WgpuPart),
     ) -> Result<(), BackendError> {
         let pass = frame.pass(request.index);
-        let encoders = pass.strategy.encoder_count(request.list.bundle_count());
+        let has_bundles = pass.raw_encoders == 0 && pass.strategy.encoder_count(request.list.bundle_count()) == 1;
         let encoder = PassEncoder::new(&self.device, frame, request);
         // Cached bundles need no error scope, which locks the device twice.
         let replayed = pass.timing.time_parallel(|| {
-            while !parts.is_empty()
+            while has_bundles
+                && !parts.is_empty()
                 && let Some(cached) = encoder.cached_bundle(parts.start)?
             {
                 emit(cached);
@@ -288,9 +297,9 @@ impl FrameRecorder for WgpuBackend {
         if parts.is_empty() {
             return Ok(());
         }
-        let record = |part| match encoders {
-            1 => encoder.record_bundle(part).map(RecordedPart::Bundle),
-            _ => encoder.encode_segment(part),
+        let record = |part| match has_bundles {
+            true => encoder.record_bundle(part).map(RecordedPart::Bundle),
+            false => encoder.encode_segment(part),
         };
         let all = || parts.map(record).try_for_each(|part| part.map(|part| emit(WgpuPart(part))));
         // One error scope for all other parts.

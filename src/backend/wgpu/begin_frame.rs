@@ -16,9 +16,10 @@ use crate::backend::error::broken_rule;
 use crate::backend::mip_schedule::MipSchedule;
 use crate::backend::{BackendError, FrameRequest};
 use crate::command::DrawList;
-use crate::process::{Access, Draws, FramePlan, ItemRecorder, Pass, PlannedProcess, ShaderResource};
+use crate::process::{Access, Draws, FramePlan, ItemRecorder, Pass, PlannedProcess, RawPassResources, ShaderResource};
 use crate::scene::Mesh;
 use crate::unwind::hold_events;
+use crate::view::RenderView;
 
 impl WgpuBackend {
     /// Begins a frame with these pipelines and targets: creates or reuses the other resources of its passes.
@@ -149,6 +150,7 @@ impl WgpuBackend {
             let pipelines = &pipelines[process];
             self.update_bind_groups(request, pipelines, targets, storage_buffers, &resources, pass)?;
 
+            pass.raw_encoders = raw_encoders(&request.draws[process], &request.views[view])?;
             let (mut index, mut is_trial) = (0, false);
             let lent = request.items_of(index_of_pass);
             let into_passes = lent.is_some_and(|items| matches!(items.recorder, ItemRecorder::Pass(_)));
@@ -310,5 +312,22 @@ fn share_encoders(passes: &mut [WgpuPassState]) {
             (true, false) => count,
             (true, true) => in_encoder + count,
         };
+    }
+}
+
+/// The number of encoders of a pass in a view that the engine encodes; 0 of another one.
+///
+/// # Errors
+/// If there are too many.
+fn raw_encoders(draws: &Draws<'_>, view: &RenderView) -> Result<usize, BackendError> {
+    let Draws::Raw(raw) = draws else { return Ok(0) };
+    let (encoders, allowed) = (raw.encoder_count(view).max(1), RawPassResources::MAX_ENCODERS);
+    match encoders > allowed {
+        true => Err(BackendError::Limit {
+            limit: "RawPassResources::MAX_ENCODERS",
+            allowed: allowed as u64,
+            needed: encoders as u64,
+        }),
+        false => Ok(encoders),
     }
 }

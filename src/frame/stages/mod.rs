@@ -71,8 +71,8 @@ impl<B: Backend> Stage<B> {
         stage("triangles", Pass, &["join"], Mode::has_cullable_meshes, cullable_draws, ByDraws { draws_per_item: 1 }, Instance, cull_triangles),
         #[cfg(feature = "occlusion")]
         stage("cull list", Pass, &["triangles"], Mode::has_cullable_meshes, one, PerItem, Instance, remove_culled),
-        stage("prepare", Pass, &["cull list", "join", "list items"], Mode::has_list, one, PerItem, Record, prepare),
-        stage("record", Pass, &["prepare"], Mode::has_list, parts, ByDraws { draws_per_item: DrawList::BATCHES_PER_BUNDLE }, Record, record),
+        stage("prepare", Pass, &["cull list", "join", "list items"], Mode::has_parts, one, PerItem, Record, prepare),
+        stage("record", Pass, &["prepare"], Mode::has_parts, parts, ByDraws { draws_per_item: DrawList::BATCHES_PER_BUNDLE }, Record, record),
         stage("finish", Pass, &["record"], Mode::always, one, PerItem, Record, finish),
     ];
 

@@ -59,6 +59,7 @@ struct GraphKey {
 struct DrawsKey {
     selection: Option<Selection>,
     draws_items: bool,
+    is_raw: bool,
     hides: bool,
     draws_where_hidden: bool,
 }
@@ -116,7 +117,7 @@ impl DrawsKey {
     fn new(draws: &Draws<'_>) -> Self {
         let (hides, draws_where_hidden) = (draws.hides(), draws.draws_where_hidden());
         let draws_items = matches!(draws, Draws::Items(_));
-        Self { selection: draws.selection(), draws_items, hides, draws_where_hidden }
+        Self { selection: draws.selection(), draws_items, is_raw: draws.is_raw(), hides, draws_where_hidden }
     }
 }
 
@@ -215,6 +216,7 @@ impl<B: Backend> StageGraph<B> {
             PassMode {
                 draws_objects: selection.is_some(),
                 draws_items: matches!(draws[pass.process_index], Draws::Items(_)),
+                is_raw: draws[pass.process_index].is_raw(),
                 orders_by_bin: selection.is_some_and(by_bin),
                 has_static_groups,
                 chooses_levels,

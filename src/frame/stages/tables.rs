@@ -445,6 +445,8 @@ pub(in crate::frame) struct PassMode {
     pub(in crate::frame) draws_objects: bool,
     /// Whether it draws items of the engine's own.
     pub(in crate::frame) draws_items: bool,
+    /// Whether the engine encodes it.
+    pub(in crate::frame) is_raw: bool,
     /// Whether it orders its objects by bin, and so makes no commands.
     pub(in crate::frame) orders_by_bin: bool,
     /// Whether the scene has static groups.
@@ -468,6 +470,11 @@ impl PassMode {
 
     pub(in crate::frame) fn draws_items(self) -> bool {
         self.draws_items
+    }
+
+    /// Whether the pass may be recorded in parts: those of its draw list, or the encoders of a raw pass.
+    pub(in crate::frame) fn has_parts(self) -> bool {
+        self.has_list() || self.is_raw
     }
 
     /// Whether the pass has a draw list.

@@ -50,6 +50,8 @@ pub(crate) struct WgpuPassState {
     pub(crate) draws_commands: bool,
     /// Whether it draws items of the engine's own.
     pub(crate) draws_items: bool,
+    /// The number of encoders of a raw pass; 0 for another one.
+    pub(crate) raw_encoders: usize,
     /// Whether it is recorded by the strategy that is measured to be the cheapest.
     pub(crate) is_tuned: bool,
     /// Whether it draws what is in front of the near plane as if it were on it, with pipelines of its own.
@@ -99,6 +101,7 @@ impl Default for WgpuPassState {
             label: String::new(),
             draws_commands: false,
             draws_items: false,
+            raw_encoders: 0,
             is_tuned: false,
             clamps_depth: false,
             object_list: 0..0,

@@ -32,7 +32,7 @@ impl PassEncoder<'_> {
             return Ok(());
         }
         let lent = self.lent_items()?;
-        self.with_context(|context| {
+        self.with_context(0, |context| {
             let mut pass = self.begin(encoder, segment)?;
             match lent.recorder {
                 ItemRecorder::Any(recorder) => self.call(range, |items| recorder.record(&mut pass, items, context)),
@@ -95,7 +95,7 @@ impl PassEncoder<'_> {
     fn new_item_bundle(&self, bundle: usize) -> Result<(wgpu::RenderBundle, u64), BackendError> {
         let descriptor = self.pipelines.bundle_descriptor(&self.state.label);
         let (recorder, range) = (self.bundle_recorder()?, self.list.items.bundle_range(bundle));
-        self.with_context(|context| {
+        self.with_context(0, |context| {
             let mut encoder = self.device.create_render_bundle_encoder(&descriptor);
             let mut digest = 0;
             if cfg!(debug_assertions) {
@@ -115,7 +115,7 @@ impl PassEncoder<'_> {
     /// If the engine's code fails or panics.
     fn digest_of(&self, bundle: usize) -> Result<u64, BackendError> {
         let (recorder, range) = (self.bundle_recorder()?, self.list.items.bundle_range(bundle));
-        self.with_context(|context| {
+        self.with_context(0, |context| {
             let mut digest = CommandDigest::new(None);
             self.call(range, |items| recorder.record(&mut digest, items, context))?;
             Ok(digest.value())

@@ -184,29 +184,38 @@ impl<'a> PassEncoder<'a> {
         Ok(())
     }
 
-    /// Has a raw pass encode itself.
+    /// Has a raw pass encode itself, or one of its encoders.
     ///
     /// # Errors
     /// If the raw pass asks for what its process does not declare, or reports an error, or a resource of the pass is
     /// missing. The latter is a bug in Drawloom.
-    pub(super) fn encode_raw(&self, encoder: &mut wgpu::CommandEncoder, raw: &dyn RawPass) -> Result<(), BackendError> {
+    pub(super) fn encode_raw(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        raw: &dyn RawPass,
+        index: usize,
+    ) -> Result<(), BackendError> {
         let queries = self.queries();
-        if let Some((set, [begin, _])) = queries {
+        if let Some((set, [begin, _])) = queries.filter(|_| index == 0) {
             encoder.write_timestamp(set, begin);
         }
-        self.with_context(|context| raw.encode(encoder, &context.resources))?.map_err(BackendError::RawPass)?;
-        if let Some((set, [_, end])) = queries {
+        self.with_context(index, |context| raw.encode(encoder, &context.resources))?.map_err(BackendError::RawPass)?;
+        if let Some((set, [_, end])) = queries.filter(|_| index + 1 == self.state.raw_encoders) {
             encoder.write_timestamp(set, end);
         }
         Ok(())
     }
 
-    /// Calls the engine's code with what it may use.
+    /// Calls the engine's code with what it may use, in one of the encoders of a raw pass.
     ///
     /// # Errors
     /// If the code asks for what its process does not declare, or a resource of the pass is missing. The latter is a bug
     /// in Drawloom.
-    pub(super) fn with_context<R>(&self, call: impl FnOnce(&ItemContext<'_>) -> R) -> Result<R, BackendError> {
+    pub(super) fn with_context<R>(
+        &self,
+        encoder: usize,
+        call: impl FnOnce(&ItemContext<'_>) -> R,
+    ) -> Result<R, BackendError> {
         let (frame, pass, plan) = (self.frame, self.state.pass, self.request.plan);
         let PlannedProcess { name, declaration, requests, .. } = self.planned;
         let textures = |name: &str| {
@@ -234,6 +243,7 @@ impl<'a> PassEncoder<'a> {
             device: self.device,
             view: pass.view_index,
             size: view.camera.size,
+            encoder,
             bind_group_layouts: [&frame.layouts.frame, &frame.layouts.assets],
             bind_groups: [of_frame, of_materials],
             materials_bind_groups,
@@ -344,7 +354,7 @@ impl PassEncoder<'_> {
         let accesses = &self.planned.declaration.accesses;
         let clears = accesses.iter().any(|(_, access)| access.writes() && !access.reads());
         match (self.draws, strategy.recording) {
-            (Draws::Raw(raw), _) => self.encode_raw(encoder, *raw)?,
+            (Draws::Raw(raw), _) => self.encode_raw(encoder, *raw, 0)?,
             // A pass that would only load and store its targets.
             (Draws::Commands(_) | Draws::Items(_), _)
                 if self.list.draw_count() == 0 && timed_pass_index.is_none() && !clears => {}
@@ -373,6 +383,10 @@ impl PassEncoder<'_> {
     /// If a resource of the pass is missing. This is a bug in Drawloom.
     pub(crate) fn encode_segment(&self, segment: usize) -> Result<RecordedPart, BackendError> {
         use RecordingStrategy::{Bundles, CachedBundles, Direct};
+        if let Draws::Raw(raw) = self.draws {
+            let encoder = self.encode(|encoder| self.encode_raw(encoder, *raw, segment))?;
+            return Ok(RecordedPart::Encoder(encoder.finish()));
+        }
         let strategy = self.state.strategy;
         let bundles = strategy.bundles_of_encoder(self.list, segment);
         let segment = strategy.segment_of_encoder(self.list, segment);
