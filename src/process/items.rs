@@ -303,6 +303,26 @@ impl ItemContext<'_> {
     /// when the data has another buffer: in each frame in flight, and when it grows. Everything else that the bind group
     /// refers to stays the same, or has another index.
     ///
+    /// ```
+    /// use drawloom::process::ItemContext;
+    /// use drawloom::wgpu;
+    ///
+    /// /// The bind group of shaders that read `Items::data`; `None` if there are no data.
+    /// fn bind_data<'c>(
+    ///     context: &'c ItemContext<'_>,
+    ///     layout: &wgpu::BindGroupLayout,
+    /// ) -> Option<&'c wgpu::BindGroup> {
+    ///     let data = context.data?;
+    ///     Some(context.bind_group(0, || {
+    ///         context.resources.device.create_bind_group(&wgpu::BindGroupDescriptor {
+    ///             label: Some("transforms"),
+    ///             layout,
+    ///             entries: &[wgpu::BindGroupEntry { binding: 0, resource: data.as_entire_binding() }],
+    ///         })
+    ///     }))
+    /// }
+    /// ```
+    ///
     /// # Panics
     /// If the index is not less than [`Self::MAX_BIND_GROUPS`].
     pub fn bind_group(&self, index: usize, make: impl FnOnce() -> wgpu::BindGroup) -> &wgpu::BindGroup {
