@@ -6,6 +6,7 @@
 mod asset_loader;
 mod assets;
 mod camera;
+mod camera_matrices;
 mod changes;
 mod chunk_users;
 mod clip_plane;

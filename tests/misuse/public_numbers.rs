@@ -132,6 +132,8 @@ const EXTREMES: &[&str] = &[
     "scene::Camera::position",
     "scene::Camera::shift",
     "scene::Camera::looking_at",
+    // In `src/scene/camera_matrices.rs`.
+    "scene::Camera::from_matrices",
     "scene::WholePicture::",
     "scene::ClipPlane::",
     "scene::Material::",
