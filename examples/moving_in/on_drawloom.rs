@@ -92,7 +92,7 @@ impl RecordItems for Engine {
         let view = match context.view.kind() {
             ViewKind::Shadow => SHADOW,
             ViewKind::Reflection => MIRROR,
-            ViewKind::Main | ViewKind::Post => MAIN,
+            _ => MAIN,
         };
         self.draw_all(encoder, view, drawables.items().iter().copied());
         Ok(())

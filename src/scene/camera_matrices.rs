@@ -74,8 +74,8 @@ impl Camera {
         if scale.min_element() <= 0.0 {
             return Err("its projection matrix mirrors");
         }
-        let aspect = f64::from(self.aspect());
-        if !((scale.x * aspect / scale.y - 1.0).abs() <= MAX_ASPECT_DEVIATION) {
+        let deviation = (scale.x * f64::from(self.aspect()) / scale.y - 1.0).abs();
+        if deviation.is_nan() || deviation > MAX_ASPECT_DEVIATION {
             return Err("its projection matrix fits a picture of another aspect");
         }
         // Depth is a + b ÷ distance in perspective, and a + b × distance without; 0 is at one of the planes, 1 at the

@@ -11,6 +11,24 @@ pub enum ViewKind {
     /// view that it is [named](super::Camera::child_name) after, as `main/mirror` is after `main`, or else the scene's
     /// first one.
     Reflection,
+    /// A kind of an engine's own, as are the three after it: a map seen from above, a probe, a screen. Only processes that
+    /// [declare](crate::process::Declare::views) it draw in its views. Views of other kinds
+    /// [sample](crate::process::Declare::samples_view) them. Lights reach it, without shadow maps of directional lights
+    /// of its own.
+    ///
+    /// ```
+    /// use drawloom::scene::ViewKind;
+    ///
+    /// /// What the engine calls it.
+    /// const MAP: ViewKind = ViewKind::Own1;
+    /// ```
+    Own1,
+    /// As [`ViewKind::Own1`].
+    Own2,
+    /// As [`ViewKind::Own1`].
+    Own3,
+    /// As [`ViewKind::Own1`].
+    Own4,
     /// The picture on the screen.
     #[default]
     Main,
@@ -48,12 +66,32 @@ pub(crate) struct ViewRules {
     pub(crate) has_plain_names: bool,
 }
 
+impl ViewRules {
+    /// Those of a kind of an engine's own.
+    const fn of_engine(name: &'static str) -> Self {
+        Self {
+            name,
+            is_shadow_map: false,
+            is_lit: true,
+            owns_shadow_maps: false,
+            clamps_depth: false,
+            allows_paraboloid: false,
+            culls_hidden: true,
+            level_error_scale: 1.0,
+            shares_chain_of: None,
+            is_optional: true,
+            has_plain_names: false,
+        }
+    }
+}
+
 impl ViewKind {
     /// How many kinds there are.
     pub const COUNT: usize = Self::ALL.len();
 
     /// All kinds, in order.
-    pub(crate) const ALL: [Self; 4] = [Self::Shadow, Self::Reflection, Self::Main, Self::Post];
+    pub(crate) const ALL: [Self; 8] =
+        [Self::Shadow, Self::Reflection, Self::Own1, Self::Own2, Self::Own3, Self::Own4, Self::Main, Self::Post];
 
     /// The properties of the kind.
     pub(crate) const fn rules(self) -> &'static ViewRules {
@@ -84,6 +122,10 @@ impl ViewKind {
                 is_optional: true,
                 has_plain_names: false,
             },
+            Self::Own1 => const { &ViewRules::of_engine("own 1") },
+            Self::Own2 => const { &ViewRules::of_engine("own 2") },
+            Self::Own3 => const { &ViewRules::of_engine("own 3") },
+            Self::Own4 => const { &ViewRules::of_engine("own 4") },
             Self::Main => &ViewRules {
                 name: "main",
                 is_shadow_map: false,
@@ -130,13 +172,17 @@ const _: () = {
 
 #[cfg(test)]
 mod tests {
-    use super::ViewKind::{self, Main, Post, Reflection, Shadow};
+    use super::ViewKind::{self, Main, Own1, Own2, Own3, Own4, Post, Reflection, Shadow};
 
     /// Does not compile without an arm for each kind.
     fn next(kind: ViewKind) -> Option<ViewKind> {
         match kind {
             Shadow => Some(Reflection),
-            Reflection => Some(Main),
+            Reflection => Some(Own1),
+            Own1 => Some(Own2),
+            Own2 => Some(Own3),
+            Own3 => Some(Own4),
+            Own4 => Some(Main),
             Main => Some(Post),
             Post => None,
         }

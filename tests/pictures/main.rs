@@ -50,6 +50,7 @@ mod multisampling;
 mod view_filter;
 mod static_groups;
 mod own_pipelines;
+mod own_views;
 mod pipeline_state;
 mod placement;
 mod post;
@@ -142,6 +143,7 @@ fn main() {
         (view_filter::CASES, Needs::Adapter),
         (static_groups::CASES, Needs::Adapter),
         (own_pipelines::CASES, Needs::Adapter),
+        (own_views::CASES, Needs::Adapter),
         (pipeline_state::CASES, Needs::Adapter),
         (placement::CASES, Needs::Adapter),
         (post::CASES, Needs::Adapter),
