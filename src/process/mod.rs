@@ -22,6 +22,7 @@ mod draws;
 mod face_culling;
 mod format;
 mod injection_point;
+mod item_set_id;
 mod items;
 mod mip_levels;
 mod parameters;
@@ -64,9 +65,9 @@ pub use draws::{CommandDraws, Draws, FullScreen, LightDraws, MaskedEntryPoints};
 pub use face_culling::FaceCulling;
 pub use format::Format;
 pub use injection_point::InjectionPoint;
+pub(crate) use item_set_id::ItemSetId;
 #[cfg(feature = "wgpu")]
 pub(crate) use items::ItemBindGroups;
-pub(crate) use items::ItemSetId;
 #[cfg(feature = "wgpu")]
 pub use items::{ItemContext, ItemRecorder, RecordItems, RecordItemsInPass};
 pub use items::{ItemDraws, ItemOrder, ItemRange, ItemViews, Items};

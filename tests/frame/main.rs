@@ -6,6 +6,7 @@ mod absent_features;
 mod backend_layers;
 mod backward_reach;
 mod bad_input;
+mod camera_matrices;
 mod changes;
 mod changing_processes;
 #[cfg(feature = "wgpu")]

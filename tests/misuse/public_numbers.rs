@@ -132,7 +132,7 @@ const EXTREMES: &[&str] = &[
     "scene::Camera::position",
     "scene::Camera::shift",
     "scene::Camera::looking_at",
-    // In `src/scene/camera_matrices.rs`.
+    // In `tests/frame/camera_matrices.rs`.
     "scene::Camera::from_matrices",
     "scene::WholePicture::",
     "scene::ClipPlane::",
