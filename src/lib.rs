@@ -42,7 +42,7 @@
 //! | [`quality::Quality`] | what trades accuracy for speed |
 //! | [`task::Scheduler`], [`FrameStatistics`] | the threads; what a frame drew and left out |
 //!
-//! The `guide` (feature `wgpu`) leads from a plain wgpu renderer to Drawloom in seven steps. [`timeline`] tells what
+//! The `guide` (feature `wgpu`) leads from a plain wgpu renderer to Drawloom in eight steps. [`timeline`] tells what
 //! ran where and when, and `report`, behind its feature, why a frame took its time. The modules [`task`], [`graph`],
 //! [`fence`], [`timeline`] and `report` are those of `drawloom-jobs`, a crate without wgpu.
 //!

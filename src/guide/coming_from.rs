@@ -13,7 +13,7 @@
 //! | `ExtractSchedule`, `Changed<T>` | | a dirty flag | [`Changes`]: what the engine reports; `examples/ecs` derives it from ticks |
 //! | `PipelineCache`, which compiles in the background | | pipelines made at start | [`WarmUp`] at start, [`Renderer::prepare_pipelines_in_background`] later; otherwise in the frame that needs one first |
 //! | `ComputeTaskPool`, `par_iter_mut` | | rayon | [`Scheduler`], [`Scheduler::parallel_for_each`]: one set of threads for engine and renderer |
-//! | `PipelinedRenderingPlugin` | | a render thread | `record`, then `submit` on the device thread beside the next update: see [step 7](super::from_wgpu#7-overlap-and-look) |
+//! | `PipelinedRenderingPlugin` | | a render thread | `record`, then `submit` on the device thread beside the next update: see [step 8](super::from_wgpu#8-overlap-and-look) |
 //! | `RenderDiagnosticsPlugin`, Tracy | | timers of one's own | the [timeline](crate::timeline), the inspector, `drawloom-tracy` |
 //!
 //! What differs most, in one sentence each:

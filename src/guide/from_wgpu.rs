@@ -1,4 +1,4 @@
-//! From a plain wgpu renderer to Drawloom, in seven steps.
+//! From a plain wgpu renderer to Drawloom, in eight steps.
 //!
 //! The renderer that we begin with is the usual one: a device, a window, and a loop that writes the transforms of all
 //! objects into a buffer, opens a render pass, and draws one object after the other. It spends its frame on one thread.
@@ -214,10 +214,15 @@
 //! in which nothing changed.
 //!
 //! - The process says where the draws go: a [`RenderProcess`] with the targets that your pipelines draw into, and
-//!   [`Draws::Items`](crate::process::Draws::Items).
+//!   [`Draws::Items`](crate::process::Draws::Items). Depth targets are cleared to 0, as Drawloom's depth is reversed; for
+//!   pipelines whose far plane is at depth 1, say [`clears_depth_to(1.0)`](crate::process::Declare::clears_depth_to).
+//!   What only bind groups of your own read needs [`keep`](crate::process::Declare::keep): the frame does not see who
+//!   reads it.
 //! - The loop over what you draw becomes [`RecordItems`](crate::process::RecordItems). It gets its items in the order of
-//!   their keys, and records into a [`RenderEncoder`](wgpu::util::RenderEncoder), which passes and bundles both are. Code
-//!   that sets viewports or scissors is a [`RecordItemsInPass`](crate::process::RecordItemsInPass).
+//!   their keys, and records into a [`RenderEncoder`](wgpu::util::RenderEncoder), which passes and bundles both are: a
+//!   trait of yours for `wgpu::RenderPass<'a>` becomes one for `dyn RenderEncoder<'a> + '_`. Code that sets viewports or
+//!   scissors is a [`RecordItemsInPass`](crate::process::RecordItemsInPass), which is recorded anew in every frame.
+//! - Cameras that cull by your matrices come from [`Camera::from_matrices`](crate::scene::Camera::from_matrices).
 //! - [`Renderer::record_with`] takes the items of a frame beside its scene, whose cameras they are culled for.
 //!
 //! [`Items`](crate::process::Items) has all of that as an example.

@@ -44,7 +44,8 @@ impl Declare {
         self.access(target.as_ref(), Access::DrawOver);
     }
 
-    /// Tests and writes a depth target, first cleared to 0: infinitely far away, as depth is reversed. If it has a
+    /// Tests and writes a depth target, first cleared to 0: infinitely far away, as depth is reversed; or to [another
+    /// depth](Declare::clears_depth_to), for pipelines of an engine's own whose depth is not. If it has a
     /// [stencil](super::Stencil), that is written and cleared to 0 too.
     pub fn clears_depth(&mut self, target: impl AsRef<str>, format: Format) {
         self.access(target.as_ref(), Access::ClearDepth(format));

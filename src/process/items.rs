@@ -122,11 +122,13 @@ pub struct Items<'a> {
     pub layers: &'a [LayerMask],
     /// A version of each item: items with the version that they had in an earlier frame are recorded to the same
     /// commands, with the same buffers, bind groups and pipelines; these, and [`Items::data`], may have other contents.
+    /// The engine promises that, and builds with debug assertions check it. An item has another version if another
+    /// object takes its index, or one of its bind groups is made anew: a number of the object and of its bind groups.
     /// Bundles of such items are kept. Empty if nothing is known about that: then all are recorded in every frame.
     pub versions: &'a [u64],
     /// Which items have another entry in one of these slices than in the [`Items`] that the same renderer was given for
     /// this process last, as for the [objects of a scene](crate::scene::SceneRef::changes). If it is
-    /// [`Changes::Unknown`], all are compared.
+    /// [`Changes::Unknown`], or the number of items changes, all are compared. Builds with debug assertions check it.
     pub changes: Changes<'a>,
     /// Bytes of the engine's own for this frame, which its shaders read from [`ItemContext::data`]: transforms, instances
     /// of each item, uniforms. A multiple of 4; where shaders bind parts of it, these begin where the device's limits

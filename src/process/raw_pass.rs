@@ -51,7 +51,8 @@ pub trait RawPass: Send + Sync {
 pub struct RawPassResources<'a> {
     /// The device.
     pub device: &'a wgpu::Device,
-    /// The view's index among the frame's views.
+    /// The view's index among [the frame's views](crate::RecordedFrame::views): those of the scene's cameras in
+    /// their order, then those of shadow maps of lights.
     pub view: usize,
     /// Width and height of the view's picture, in pixels.
     pub size: [u32; 2],

@@ -239,8 +239,9 @@ impl WgpuBackend {
     /// be the target's, or differ only in sRGB; then its `view_formats`, or those of the surface's configuration, must
     /// contain the target's. Its usages must include `RENDER_ATTACHMENT` if processes draw into it, `TEXTURE_BINDING`
     /// if they sample it, and `COPY_SRC` if they read its history or it is read back. Targets that are multisampled,
-    /// have mip levels, are drawn in layers or are the history of another one cannot be imported. If something does not
-    /// fit, the frame returns [`BackendError::InvalidImport`].
+    /// have mip levels, are drawn in layers or are the history of another one cannot be imported; nor can a layer of an
+    /// array or a face of a cube map be: a [raw pass](crate::process::RawPass) copies a target into it. If something does
+    /// not fit, the frame returns [`BackendError::InvalidImport`].
     ///
     /// A second import of the same target replaces the first. Frames after the next one draw into the crate's own
     /// target again, also if that one fails.

@@ -474,7 +474,7 @@ pub(crate) struct PassTiming {
     replayed_bundles: AtomicUsize,
     /// Whether the cost is no sample of the strategy's, because the caches were dropped.
     is_cold: AtomicBool,
-    /// What cached bundles are divided by, in a pass of items: see [`ItemList`](crate::command::ItemList).
+    /// What cached bundles are divided by, in a pass of items: see [`ItemList`].
     group_size: AtomicUsize,
 }
 
